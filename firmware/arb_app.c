@@ -1,0 +1,76 @@
+#include "arb_app.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "pdcp_time.h"
+
+/* On a target with 16-bit pointers the whole application has to fit its budget: a negative array size does
+ * not compile. */
+typedef char arb_app_fits_its_budget[sizeof(void *) > 2 || sizeof(arb_app_t) <= ARB_RAM_BUDGET ? 1 : -1];
+
+static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
+{
+    arb_app_t *app = ctx;
+    if (event->kind == PDCP_EVENT_IDENTITIES) {
+        arb_store_touch(&app->store, now_ms);
+    }
+    arb_hostapi_on_event(&app->api, event);
+    if (app->observer != NULL) {
+        app->observer(app->observer_ctx, now_ms, event);
+    }
+}
+
+void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings, uint32_t now_ms)
+{
+    memset(app, 0, sizeof *app);
+    app->port = port;
+    pdcp_arb_init(&app->arb, now_ms, on_event, app);
+    arb_hostapi_init(&app->api);
+    app->api.strict = settings->strict_crc;
+    arb_store_load(&app->store, port, &app->arb.bind);
+}
+
+void arb_app_observe(arb_app_t *app, arb_observer_t observer, void *ctx)
+{
+    app->observer = observer;
+    app->observer_ctx = ctx;
+}
+
+void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
+{
+    pdcp_arb_on_frame(&app->arb, now_ms, frame);
+}
+
+uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len)
+{
+    return arb_hostapi_on_bytes(&app->api, now_ms, bytes, len);
+}
+
+static void send_frames(arb_app_t *app)
+{
+    const can_frame_t *frame = pdcp_arb_tx_peek(&app->arb);
+    while (frame != NULL && app->port->can_send(app->port->ctx, frame)) {
+        pdcp_arb_tx_pop(&app->arb);
+        frame = pdcp_arb_tx_peek(&app->arb);
+    }
+}
+
+static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
+{
+    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
+}
+
+uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
+{
+    uint32_t next_ms;
+    bool again;
+    do {
+        next_ms = pdcp_arb_step(&app->arb, now_ms);
+        again = arb_hostapi_step(&app->api, &app->arb, app->port, now_ms);
+    } while (again);
+    send_frames(app);
+    arb_store_step(&app->store, app->port, &app->arb.bind, now_ms);
+    next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
+    return earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
+}

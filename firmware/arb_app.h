@@ -1,0 +1,47 @@
+/* The arbitrator as an application: owns all state, joins the bus (pdcp/), the host API and what is stored.
+ *
+ * Passive: the program hands in frames, bytes and the time, then calls arb_app_step, which sends through the
+ * port and says when it wants to be called again. The program calls it also when the controller or the host
+ * has room again after a refusal. One thread; any number of applications. */
+#ifndef ARB_APP_H
+#define ARB_APP_H
+
+#include "arb_hostapi.h"
+#include "arb_port.h"
+#include "arb_store.h"
+#include "pdcp_arb.h"
+
+typedef struct {
+    bool strict_crc; /* refuse host messages with wrong checksums (D-API-1) */
+} arb_settings_t;
+
+/* Told of everything that happens on the bus, for a log or a display. Must not call back into the application
+ * but to read its tables. */
+typedef void (*arb_observer_t)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
+
+typedef struct {
+    pdcp_arb_t arb;
+    arb_hostapi_t api;
+    arb_store_t store;
+    const arb_port_t *port;
+    arb_observer_t observer; /* NULL: nobody */
+    void *observer_ctx;
+} arb_app_t;
+
+/* Reads what is stored and starts. port must outlive the application. */
+void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings, uint32_t now_ms);
+
+/* Sets who is told of events; NULL: nobody. */
+void arb_app_observe(arb_app_t *app, arb_observer_t observer, void *ctx);
+
+/* A frame from the bus, of any kind, not sent by this application. Then call arb_app_step; several frames may
+ * be handed in before one step. */
+void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame);
+
+/* Bytes from the host. Returns how many were taken; the rest is offered again after the next step. */
+uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len);
+
+/* Does everything that is due. Returns the absolute time of the next call at the latest. */
+uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms);
+
+#endif

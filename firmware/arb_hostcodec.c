@@ -1,0 +1,95 @@
+#include "arb_hostcodec.h"
+
+static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
+{
+    crc ^= byte;
+    for (uint8_t bit = 0; bit < 8; bit++) {
+        const bool high = (crc & 0x80u) != 0;
+        crc = (uint8_t)(crc << 1);
+        if (high) {
+            crc ^= 0x07u;
+        }
+    }
+    return crc;
+}
+
+uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
+{
+    static const uint8_t covered[] = {2, 3, 4, 6, 7};
+    uint8_t crc = 0;
+    for (uint8_t i = 0; i < sizeof covered; i++) {
+        crc = crc8_byte(crc, header[covered[i]]);
+    }
+    return crc;
+}
+
+uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len)
+{
+    uint16_t crc = 0xFFFF;
+    for (uint16_t i = 0; i < len; i++) {
+        crc = (uint16_t)(crc ^ (uint16_t)((uint16_t)payload[i] << 8));
+        for (uint8_t bit = 0; bit < 8; bit++) {
+            const bool high = (crc & 0x8000u) != 0;
+            crc = (uint16_t)(crc << 1);
+            if (high) {
+                crc ^= 0x1021u;
+            }
+        }
+    }
+    return crc;
+}
+
+uint16_t arb_host_get_u16(const uint8_t *bytes)
+{
+    return (uint16_t)(bytes[0] | (uint16_t)((uint16_t)bytes[1] << 8));
+}
+
+void arb_host_put_u16(uint8_t *bytes, uint16_t value)
+{
+    bytes[0] = (uint8_t)(value & 0xFFu);
+    bytes[1] = (uint8_t)(value >> 8);
+}
+
+void arb_host_decode_header(const uint8_t bytes[ARB_HOST_HEADER], arb_host_header_t *header)
+{
+    header->id = arb_host_get_u16(&bytes[2]);
+    header->reference = bytes[4];
+    header->crc8 = bytes[5];
+    header->size = arb_host_get_u16(&bytes[6]);
+}
+
+uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)
+{
+    const uint16_t size = len != 0 ? (uint16_t)(len + ARB_HOST_CRC) : 0;
+    frame[0] = ARB_HOST_SYNC1;
+    frame[1] = ARB_HOST_SYNC2;
+    arb_host_put_u16(&frame[2], id);
+    frame[4] = reference;
+    arb_host_put_u16(&frame[6], size);
+    frame[5] = arb_host_crc8(frame);
+    if (len != 0) {
+        arb_host_put_u16(&frame[ARB_HOST_HEADER + len], arb_host_crc16(&frame[ARB_HOST_HEADER], len));
+    }
+    return (uint16_t)(ARB_HOST_HEADER + size);
+}
+
+pdcp_identity_t arb_host_get_identity(const uint8_t bytes[6])
+{
+    const pdcp_identity_t identity = {.vid = arb_host_get_u16(&bytes[0]),
+                                      .pid = arb_host_get_u16(&bytes[2]),
+                                      .sn = arb_host_get_u16(&bytes[4])};
+    return identity;
+}
+
+void arb_host_put_identity(uint8_t bytes[6], const pdcp_identity_t *identity)
+{
+    arb_host_put_u16(&bytes[0], identity->vid);
+    arb_host_put_u16(&bytes[2], identity->pid);
+    arb_host_put_u16(&bytes[4], identity->sn);
+}
+
+void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index)
+{
+    arb_host_put_identity(bytes, identity);
+    bytes[6] = index;
+}

@@ -1,0 +1,83 @@
+/* Wire layout of the host API [API 3.1]: header, checksums, and the fields that messages are made of. Nobody
+ * else shifts bytes of a host message.
+ *
+ *   byte     0    1    2       3       4    5     6         7         8 ...    last two
+ *            FEh  19h  id LSB  id MSB  ref  CRC8  size LSB  size MSB  payload  CRC16 LSB, MSB
+ *
+ * size counts the payload and its CRC16; 0 means that neither is there. */
+#ifndef ARB_HOSTCODEC_H
+#define ARB_HOSTCODEC_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_limits.h"
+#include "pdcp_spec.h"
+
+enum {
+    ARB_HOST_SYNC1 = 0xFE,
+    ARB_HOST_SYNC2 = 0x19,
+    ARB_HOST_HEADER = 8, /* bytes */
+    ARB_HOST_CRC = 2     /* bytes */
+};
+
+/* Longest payloads: a set request is dev, channel index, parameter id and the value; an answer is a value. */
+#define ARB_HOST_REQUEST_MAX (8 + PDCP_PARAMETER_MAX)
+#define ARB_HOST_ANSWER_MAX PDCP_PARAMETER_MAX
+
+/* Request ids; the success answer is id + 1, the failure answer id + 2 [API 3.2]. */
+enum {
+    ARB_MSG_UNKNOWN_ID = 0x2200, /* answer to an id that does not exist */
+    ARB_MSG_SYSTEM_INFO = 0x2201,
+    ARB_MSG_DEVICE_INFO = 0x2204,
+    ARB_MSG_INPUT_INFO = 0x2207,
+    ARB_MSG_OUTPUT_INFO = 0x220A,
+    ARB_MSG_LINK_INFO = 0x220D,
+    ARB_MSG_GET_PARAMETER = 0x2301,
+    ARB_MSG_SET_PARAMETER = 0x2304,
+    ARB_MSG_CONFIGURE_LINK = 0x2307
+};
+
+/* Error codes of failure answers (D-API-4). */
+enum {
+    ARB_OK = 0,
+    ARB_ERR_SIZE = 0x01,
+    ARB_ERR_NUMBER = 0x02,
+    ARB_ERR_DEVICE = 0x03,
+    ARB_ERR_CHANNEL = 0x04,
+    ARB_ERR_NO_ANSWER = 0x05,
+    ARB_ERR_REFUSED = 0x06,
+    ARB_ERR_BUSY = 0x07,
+    ARB_ERR_BULK = 0x0A,
+    ARB_ERR_NOT_READY = 0x0B,
+    ARB_ERR_CRC = 0x0C,
+    ARB_ERR_VALUE = 0x0F
+};
+
+typedef struct {
+    uint16_t id;
+    uint8_t reference;
+    uint8_t crc8;
+    uint16_t size; /* of payload and CRC16 together */
+} arb_host_header_t;
+
+/* Polynomial 07h, initial 00h, not reflected; over header bytes 2, 3, 4, 6, 7 (D-API-1). */
+uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER]);
+
+/* Polynomial 1021h, initial FFFFh, not reflected; over the payload (D-API-1). */
+uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len);
+
+void arb_host_decode_header(const uint8_t bytes[ARB_HOST_HEADER], arb_host_header_t *header);
+
+/* Completes a message whose payload of len bytes stands at frame + ARB_HOST_HEADER: writes header and CRC16.
+ * Returns the length of the whole message. frame[] needs room for header, payload and CRC16. */
+uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len);
+
+/* Fields, LSB first. */
+uint16_t arb_host_get_u16(const uint8_t *bytes);
+pdcp_identity_t arb_host_get_identity(const uint8_t bytes[6]); /* VID, PID, SN */
+void arb_host_put_u16(uint8_t *bytes, uint16_t value);
+void arb_host_put_identity(uint8_t bytes[6], const pdcp_identity_t *identity);
+void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
+
+#endif

@@ -1,0 +1,59 @@
+/* Finds requests in the host's byte stream (D-API-2). Whatever the checksums, messages are handed on
+ * (D-API-1: lenient), but one with a wrong checksum that has a header with a right one inside is taken for a
+ * truncated message with another behind it (D-API-8).
+ *
+ * Hunts for FE 19; whatever turns out to be no message is given up from its first byte on, and the bytes
+ * behind it are looked at again: a correct request right behind garbage, or swallowed by a truncated one, is
+ * found. */
+#ifndef ARB_HOSTRX_H
+#define ARB_HOSTRX_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "arb_hostcodec.h"
+
+/* Silence inside a message after which it is given up (D-API-2). */
+#define ARB_HOSTRX_TIMEOUT_MS 100
+
+typedef struct {
+    uint8_t bytes[ARB_HOST_HEADER + ARB_HOST_REQUEST_MAX + ARB_HOST_CRC];
+    uint16_t len;
+    uint16_t taken;     /* bytes of the request handed out last; they go with the next call */
+    uint32_t last_ms;   /* of the last byte */
+    uint32_t garbage;   /* bytes skipped, since the start */
+    uint32_t bad_sizes; /* headers with an impossible size */
+    uint32_t bad_crcs;  /* checksums that did not match, accepted or not */
+    uint32_t given_up;  /* messages that stopped in the middle */
+} arb_hostrx_t;
+
+/* A request; payload points into the receiver and is valid until the next call. */
+typedef struct {
+    uint16_t id;
+    uint8_t reference;
+    bool crc_ok;
+    bool too_long; /* a set request with matching CRC8 and a value beyond PDCP_PARAMETER_MAX: no payload
+                      (D-API-7) */
+    const uint8_t *payload;
+    uint16_t len;
+} arb_hostrx_request_t;
+
+void arb_hostrx_init(arb_hostrx_t *rx);
+
+/* Takes one byte. Then call arb_hostrx_next until it returns false. */
+void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte);
+
+/* Gives up a message that has been silent for too long. Then call arb_hostrx_next until it returns false. */
+void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms);
+
+/* True: a request has been received; it is taken out. */
+bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request);
+
+/* Is a message under way, so that arb_hostrx_on_time is to be called at rx->last_ms + ARB_HOSTRX_TIMEOUT_MS?
+ */
+static inline bool arb_hostrx_is_inside(const arb_hostrx_t *rx)
+{
+    return rx->len != 0;
+}
+
+#endif

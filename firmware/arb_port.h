@@ -1,0 +1,37 @@
+/* What the arbitrator needs from outside: a controller to send to, a host to write to, memory that keeps. The
+ * program that owns an arb_app_t fills one of these; the functions are called from inside arb_app_* only and
+ * never block. */
+#ifndef ARB_PORT_H
+#define ARB_PORT_H
+
+#include <stdbool.h>
+#include <stddef.h>
+#include <stdint.h>
+
+#include "can_frame.h"
+
+typedef struct {
+    void *ctx; /* handed to every function; owned by the program, outlives the application */
+
+    /* Sends one frame; it is copied. False: no room now. The application keeps the frame and offers it again
+     * in the next arb_app_step, which the program calls as soon as there is room. */
+    bool (*can_send)(void *ctx, const can_frame_t *frame);
+
+    /* Writes up to size bytes to the host; they are copied. Returns how many were taken; less than size means
+     * no room now: the program calls arb_app_step as soon as there is some. */
+    size_t (*host_write)(void *ctx, const uint8_t *bytes, size_t size);
+
+    /* Reads size bytes of non-volatile memory; only from arb_app_init. False: failed, the memory counts as
+     * empty. */
+    bool (*nvm_read)(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size);
+
+    /* Starts to write size bytes, at most ARB_PORT_NVM_PAGE and inside one page. False: busy or failed. */
+    bool (*nvm_write)(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size);
+
+    /* The write started last: 0 done, 1 under way, -1 failed. */
+    int8_t (*nvm_status)(void *ctx);
+} arb_port_t;
+
+#define ARB_PORT_NVM_PAGE 64u /* a write never crosses a multiple of this */
+
+#endif

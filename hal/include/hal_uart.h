@@ -1,0 +1,20 @@
+/* Contract: the byte stream to the host (UART on a microcontroller, pty or serial port on Linux).
+ *
+ * No function blocks; all are called from the main loop only. A host that is not there, or that closes and
+ * reopens its end, is no error: bytes written meanwhile are discarded. */
+#ifndef HAL_UART_H
+#define HAL_UART_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+typedef struct hal_uart hal_uart_t;
+
+/* Takes up to size received bytes, oldest first. Returns how many; 0 means that there are none now. */
+size_t hal_uart_read(hal_uart_t *uart, uint8_t *bytes, size_t size);
+
+/* Hands up to size bytes over; they are copied. Returns how many were taken, in order from the first;
+ * less than size means that there is no more room now, and the caller offers the rest again. */
+size_t hal_uart_write(hal_uart_t *uart, const uint8_t *bytes, size_t size);
+
+#endif

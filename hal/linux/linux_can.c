@@ -1,0 +1,72 @@
+#include "linux_can.h"
+
+#include <stdio.h>
+#include <string.h>
+
+#include "linux_can_backend.h"
+
+static const linux_can_backend_t *const backends[] = {&can_socketcan_backend, &can_socketcand_backend};
+
+#define BACKENDS (sizeof backends / sizeof backends[0])
+
+void linux_can_init(hal_can_t *can, const linux_can_backend_t *backend, const linux_can_request_t *request)
+{
+    can->backend = backend;
+    can->loop = request->loop;
+    can->ready = request->ready;
+    can->ctx = request->ctx;
+    can->health = (hal_can_health_t){.state = HAL_CAN_DOWN};
+}
+
+void linux_can_refuse(const linux_can_request_t *request, const char *reason)
+{
+    snprintf(request->error, request->error_size, "%s: %s", request->bus, reason);
+}
+
+hal_can_t *linux_can_open(loop_t *loop, const char *bus, linux_can_ready_t ready, void *ctx, char *error,
+                          size_t error_size)
+{
+    linux_can_request_t request = {
+        .loop = loop, .bus = bus, .ready = ready, .ctx = ctx, .error = error, .error_size = error_size};
+    for (size_t i = 0; i < BACKENDS; i++) {
+        size_t length = strlen(backends[i]->kind);
+        if (strncmp(bus, backends[i]->kind, length) == 0 && bus[length] == ':') {
+            request.address = bus + length + 1;
+            return backends[i]->open(&request);
+        }
+    }
+    linux_can_refuse(&request, "not a CAN bus; expected socketcan:IFACE or socketcand:HOST:PORT/NAME");
+    return NULL;
+}
+
+void linux_can_close(hal_can_t *can)
+{
+    if (can != NULL) {
+        can->backend->close(can);
+    }
+}
+
+bool hal_can_send(hal_can_t *can, const can_frame_t *frame)
+{
+    return can->backend->send(can, frame);
+}
+
+size_t hal_can_receive(hal_can_t *can, can_frame_t *frames, size_t max)
+{
+    return can->backend->receive(can, frames, max);
+}
+
+hal_can_health_t hal_can_health(const hal_can_t *can)
+{
+    return can->health;
+}
+
+void hal_can_restart(hal_can_t *can)
+{
+    can->backend->restart(can);
+}
+
+void hal_can_set_filters(hal_can_t *can, const hal_can_filter_t *filters, size_t n)
+{
+    can->backend->set_filters(can, filters, n);
+}

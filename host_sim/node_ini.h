@@ -1,0 +1,61 @@
+/* One simulated device, described by an INI file. docs/nodes.md has the format. */
+#ifndef NODE_INI_H
+#define NODE_INI_H
+
+#include <stddef.h>
+#include <stdint.h>
+
+#include "pdcp_device.h"
+#include "profile_type.h"
+
+#define NODE_INI_RATE_MS 100u /* rate_ms of an output that names none */
+#define NODE_INI_EXTRAS_MAX 8
+
+typedef enum {
+    NODE_SIGNAL_NONE = 0,
+    NODE_SIGNAL_CONSTANT,
+    NODE_SIGNAL_SINE,
+    NODE_SIGNAL_SQUARE,
+    NODE_SIGNAL_CSV,
+    NODE_SIGNAL_COPY /* of an input; when rate_ms is 0, whenever the input receives */
+} node_signal_kind_t;
+
+/* From time_ms of the replay on, the value is this. */
+typedef struct {
+    uint32_t time_ms;
+    int32_t value;
+} node_signal_point_t;
+
+/* What an output sends. Values lie within the range of the channel's type. */
+typedef struct {
+    node_signal_kind_t kind;
+    int32_t min; /* constant: the value */
+    int32_t max;
+    uint32_t period_ms; /* sine, square, csv: of one round; csv with one point: 0, it never changes */
+    node_signal_point_t *points; /* csv: by time, the first at 0; the description's own */
+    size_t point_count;
+    uint8_t source; /* copy: channel index of the input */
+    uint32_t rate_ms;
+} node_signal_t;
+
+typedef struct {
+    pdcp_device_desc_t desc; /* points into this struct */
+    profile_type_t types[PDCP_DEVICE_CHANNELS_MAX];
+    node_signal_t signals[PDCP_DEVICE_CHANNELS_MAX];
+    uint8_t first_node_id; /* asked for when no state is kept; 0: a random one */
+    char *state_path;      /* where writable parameters are kept; NULL: nowhere */
+
+    /* What desc points to. */
+    pdcp_device_channel_desc_t channels[PDCP_DEVICE_CHANNELS_MAX];
+    uint8_t needs[PDCP_DEVICE_CHANNELS_MAX][2][PDCP_DEVICE_CHANNELS_MAX / 8 + 1]; /* required, desired */
+    pdcp_device_extra_t extras[NODE_INI_EXTRAS_MAX];
+    uint16_t extra_lens[NODE_INI_EXTRAS_MAX];
+    char *texts[PDCP_DEVICE_CHANNELS_MAX + 1]; /* descriptors; the device's is the first */
+} node_ini_t;
+
+/* Reads a description. NULL: error[] holds one line, FILE:LINE: what is wrong, or FILE: why it cannot be
+ * read. The caller owns the result, and everything that uses its desc must end before node_ini_free. */
+node_ini_t *node_ini_load(const char *path, char *error, size_t error_size);
+void node_ini_free(node_ini_t *ini);
+
+#endif

@@ -1,0 +1,389 @@
+/* pdcpd: the arbitrator as a Linux daemon. Joins the application to a CAN bus, a host and a file; with --can
+ * sim the bus and, with
+ * --node, the devices are in this process too. */
+#include <ctype.h>
+#include <inttypes.h>
+#include <stdarg.h>
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "arb_app.h"
+#include "hal_clock.h"
+#include "linux_can.h"
+#include "linux_nvm.h"
+#include "linux_uart.h"
+#include "loop.h"
+#include "node_ini.h"
+#include "pdcpd_options.h"
+#include "sim_node.h"
+#include "sim_world.h"
+#include "socketcand_server.h"
+
+enum { RECEIVE_BATCH = 32, HOST_BATCH = 256 };
+
+typedef struct {
+    pdcpd_options_t options;
+    arb_app_t app;
+    arb_port_t port;
+    loop_t *loop;
+    hal_uart_t *uart;
+    hal_nvm_t *nvm;
+    bool uart_ready;
+    uint8_t host_bytes[HOST_BATCH]; /* read, but not taken by the application yet */
+    size_t host_count;
+
+    hal_can_t *can; /* a bus outside; NULL: the one in world */
+    bool can_ready;
+
+    sim_world_t *world; /* NULL: the bus is outside */
+    socketcand_server_t *server;
+    node_ini_t *inis[PDCPD_NODES_MAX];
+    sim_node_t *nodes[PDCPD_NODES_MAX];
+} daemon_t;
+
+/* --- log --- */
+
+static void say(const daemon_t *daemon, pdcpd_log_t level, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+static void say(const daemon_t *daemon, pdcpd_log_t level, const char *format, ...)
+{
+    if (level > daemon->options.log) {
+        return;
+    }
+    va_list arguments;
+    va_start(arguments, format);
+    (void)fprintf(stderr, "pdcpd: ");
+    (void)vfprintf(stderr, format, arguments);
+    (void)fputc('\n', stderr);
+    va_end(arguments);
+}
+
+static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
+{
+    const daemon_t *daemon = ctx;
+    const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
+    char name[40] = "a device";
+    (void)now_ms;
+    if (event->node != PDCP_NONE) {
+        const pdcp_node_t *node = &nodes->nodes[event->node];
+        (void)snprintf(name, sizeof name, "%04X:%04X:%04X (id %u)", node->identity.vid, node->identity.pid,
+                       node->identity.sn, node->node_id);
+    }
+    switch (event->kind) {
+    case PDCP_EVENT_BOUND:
+        say(daemon, PDCPD_LOG_INFO, "%s is there", name);
+        break;
+    case PDCP_EVENT_READY:
+        say(daemon, PDCPD_LOG_INFO, "%s is set up", name);
+        break;
+    case PDCP_EVENT_SETUP_FAILED:
+        say(daemon, PDCPD_LOG_WARNING, "%s could not be set up: bound but unlinked", name);
+        break;
+    case PDCP_EVENT_LOST:
+        say(daemon, PDCPD_LOG_WARNING, "%s is gone", name);
+        break;
+    case PDCP_EVENT_REFUSED:
+        say(daemon, PDCPD_LOG_WARNING, "a device was refused: no node id or no place is left");
+        break;
+    case PDCP_EVENT_DUPLICATE:
+        say(daemon, PDCPD_LOG_WARNING, "%s exists twice: the second device was refused", name);
+        break;
+    case PDCP_EVENT_LINK:
+        say(daemon, PDCPD_LOG_INFO, "%s channel %u: link status %u%s", name,
+            nodes->channels[event->channel].index, nodes->channels[event->channel].link,
+            event->status == PDCP_OK ? "" : ", could not be made");
+        break;
+    default:
+        break;
+    }
+}
+
+/* --- port of the application --- */
+
+static bool can_send(void *ctx, const can_frame_t *frame)
+{
+    daemon_t *daemon = ctx;
+    return daemon->world != NULL ? sim_world_send(daemon->world, frame) : hal_can_send(daemon->can, frame);
+}
+
+static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
+{
+    daemon_t *daemon = ctx;
+    return hal_uart_write(daemon->uart, bytes, size);
+}
+
+static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
+{
+    daemon_t *daemon = ctx;
+    return hal_nvm_read(daemon->nvm, address, bytes, size);
+}
+
+static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
+{
+    daemon_t *daemon = ctx;
+    return hal_nvm_write(daemon->nvm, address, bytes, size);
+}
+
+static int8_t nvm_status(void *ctx)
+{
+    daemon_t *daemon = ctx;
+    return (int8_t)hal_nvm_status(daemon->nvm);
+}
+
+/* --- work --- */
+
+static void on_uart_ready(void *ctx)
+{
+    ((daemon_t *)ctx)->uart_ready = true;
+}
+
+static void on_can_ready(void *ctx)
+{
+    ((daemon_t *)ctx)->can_ready = true;
+}
+
+static void on_server_changed(void *ctx)
+{
+    (void)ctx; /* the world runs after every turn of the loop */
+}
+
+static void take_host_bytes(daemon_t *daemon, uint32_t now_ms)
+{
+    for (;;) {
+        if (daemon->host_count == 0) {
+            daemon->host_count = hal_uart_read(daemon->uart, daemon->host_bytes, HOST_BATCH);
+        }
+        if (daemon->host_count == 0) {
+            daemon->uart_ready = false;
+            return;
+        }
+        const uint16_t taken =
+            arb_app_on_bytes(&daemon->app, now_ms, daemon->host_bytes, (uint16_t)daemon->host_count);
+        daemon->host_count -= taken;
+        memmove(daemon->host_bytes, &daemon->host_bytes[taken], daemon->host_count);
+        if (daemon->host_count != 0) {
+            return; /* the host does not read its answers: the rest waits */
+        }
+    }
+}
+
+static void take_frames(daemon_t *daemon, uint32_t now_ms)
+{
+    can_frame_t frames[RECEIVE_BATCH];
+    size_t count;
+    do {
+        count = hal_can_receive(daemon->can, frames, RECEIVE_BATCH);
+        for (size_t i = 0; i < count; i++) {
+            arb_app_on_frame(&daemon->app, now_ms, &frames[i]);
+        }
+    } while (count == RECEIVE_BATCH);
+    daemon->can_ready = false;
+}
+
+/* One turn with a bus outside. */
+static void work_outside(daemon_t *daemon)
+{
+    const uint64_t now_us = loop_now_us(daemon->loop);
+    const uint32_t now_ms = (uint32_t)(now_us / 1000u);
+    if (daemon->can_ready) {
+        take_frames(daemon, now_ms);
+    }
+    if (daemon->uart_ready) {
+        take_host_bytes(daemon, now_ms);
+    }
+    const uint32_t next_ms = arb_app_step(&daemon->app, now_ms);
+    const int32_t wait_ms = (int32_t)(next_ms - now_ms);
+    loop_set_deadline_us(daemon->loop,
+                         now_us / 1000u * 1000u + (wait_ms > 0 ? (uint64_t)wait_ms : 1u) * 1000u);
+}
+
+/* One turn with the bus in this process. */
+static void work_world(daemon_t *daemon)
+{
+    const uint64_t now_us = loop_now_us(daemon->loop);
+    (void)sim_world_run(daemon->world, now_us);
+    if (daemon->uart_ready) {
+        take_host_bytes(daemon, sim_world_ms(daemon->world));
+        sim_world_touch_app(daemon->world);
+    }
+    uint64_t next_us;
+    bool again;
+    do {
+        next_us = sim_world_run(daemon->world, now_us);
+        again = daemon->server != NULL && socketcand_server_poll(daemon->server);
+    } while (again);
+    loop_set_deadline_us(daemon->loop, next_us);
+}
+
+/* --- start and end --- */
+
+static bool complain(const char *error)
+{
+    (void)fprintf(stderr, "pdcpd: %s\n", error);
+    return false;
+}
+
+/* sim or sim:PORT. */
+static bool open_world(daemon_t *daemon)
+{
+    char error[256];
+    const char *port = strchr(daemon->options.can, ':');
+    daemon->world = calloc(1, sizeof *daemon->world);
+    if (daemon->world == NULL) {
+        return complain("out of memory");
+    }
+    const uint64_t now_us = loop_refresh_now_us(daemon->loop);
+    sim_world_init(daemon->world, now_us, (uint32_t)(now_us / 1000u));
+    if (port == NULL) {
+        return true;
+    }
+    char *end;
+    const unsigned long number = strtoul(port + 1, &end, 10);
+    if (!isdigit((unsigned char)port[1]) || *end != '\0' || number > 65535) {
+        (void)snprintf(error, sizeof error, "%s: '%s' is no TCP port", daemon->options.can, port + 1);
+        return complain(error);
+    }
+    daemon->server = socketcand_server_open(daemon->loop, &daemon->world->bus, (uint16_t)number,
+                                            on_server_changed, daemon, error, sizeof error);
+    if (daemon->server == NULL) {
+        return complain(error);
+    }
+    (void)printf("bus 127.0.0.1:%u\n", socketcand_server_port(daemon->server));
+    return true;
+}
+
+static bool open_bus(daemon_t *daemon)
+{
+    char error[256];
+    if (strcmp(daemon->options.can, "sim") == 0 || strncmp(daemon->options.can, "sim:", 4) == 0) {
+        return open_world(daemon);
+    }
+    daemon->can =
+        linux_can_open(daemon->loop, daemon->options.can, on_can_ready, daemon, error, sizeof error);
+    return daemon->can != NULL || complain(error);
+}
+
+static void on_node_event(void *ctx, const sim_node_event_t *event)
+{
+    (void)ctx;
+    sim_node_print(stdout, event);
+}
+
+static bool open_nodes(daemon_t *daemon)
+{
+    char error[512];
+    for (unsigned i = 0; i < daemon->options.node_count; i++) {
+        daemon->inis[i] = node_ini_load(daemon->options.nodes[i], error, sizeof error);
+        if (daemon->inis[i] == NULL) {
+            return complain(error);
+        }
+        const uint64_t now_us = loop_refresh_now_us(daemon->loop);
+        daemon->nodes[i] = sim_node_open(daemon->inis[i], (uint32_t)now_us + i, now_us, on_node_event, NULL,
+                                         error, sizeof error);
+        if (daemon->nodes[i] == NULL) {
+            return complain(error);
+        }
+        if (!sim_world_add(daemon->world, daemon->nodes[i])) {
+            return complain("the simulated bus has no port left");
+        }
+    }
+    return true;
+}
+
+static bool open_all(daemon_t *daemon)
+{
+    char error[256];
+    daemon->loop = loop_create();
+    if (daemon->loop == NULL) {
+        return complain("the event loop cannot be made");
+    }
+    if (!open_bus(daemon)) {
+        return false;
+    }
+    daemon->uart =
+        linux_uart_open(daemon->loop, daemon->options.host, on_uart_ready, daemon, error, sizeof error);
+    if (daemon->uart == NULL) {
+        return complain(error);
+    }
+    daemon->nvm = linux_nvm_open(daemon->options.nvm, error, sizeof error);
+    if (daemon->nvm == NULL) {
+        return complain(error);
+    }
+    return open_nodes(daemon);
+}
+
+static bool start(daemon_t *daemon)
+{
+    daemon->port = (arb_port_t){.ctx = daemon,
+                                .can_send = can_send,
+                                .host_write = host_write,
+                                .nvm_read = nvm_read,
+                                .nvm_write = nvm_write,
+                                .nvm_status = nvm_status};
+    const arb_settings_t settings = {.strict_crc = daemon->options.strict_crc};
+    const uint32_t now_ms = (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);
+    arb_app_init(&daemon->app, &daemon->port, &settings, now_ms);
+    arb_app_observe(&daemon->app, on_event, daemon);
+    if (daemon->app.store.damaged != 0) {
+        say(daemon, PDCPD_LOG_WARNING, "%s: %u of %d copies of the identities are damaged",
+            daemon->options.nvm, daemon->app.store.damaged, ARB_STORE_AREAS);
+    }
+    if (daemon->world != NULL && !sim_world_set_app(daemon->world, &daemon->app)) {
+        return complain("the simulated bus has no port left");
+    }
+    (void)printf("host %s\n", linux_uart_path(daemon->uart));
+    return true;
+}
+
+static void close_all(daemon_t *daemon)
+{
+    for (unsigned i = 0; i < PDCPD_NODES_MAX; i++) {
+        sim_node_close(daemon->nodes[i]);
+        node_ini_free(daemon->inis[i]);
+    }
+    socketcand_server_close(daemon->server);
+    if (daemon->can != NULL) {
+        linux_can_close(daemon->can);
+    }
+    if (daemon->uart != NULL) {
+        linux_uart_close(daemon->uart);
+    }
+    if (daemon->nvm != NULL) {
+        linux_nvm_close(daemon->nvm);
+    }
+    if (daemon->loop != NULL) {
+        loop_destroy(daemon->loop);
+    }
+    free(daemon->world);
+    pdcpd_options_free(&daemon->options);
+}
+
+static void run(daemon_t *daemon)
+{
+    daemon->uart_ready = true;
+    daemon->can_ready = daemon->can != NULL;
+    do {
+        if (daemon->world != NULL) {
+            work_world(daemon);
+        } else {
+            work_outside(daemon);
+        }
+    } while (loop_run_once(daemon->loop));
+}
+
+int main(int argc, char **argv)
+{
+    static daemon_t daemon;
+    int status = PDCPD_EXIT_USAGE;
+    pdcpd_options_parse(&daemon.options, argc, argv);
+    (void)setvbuf(stdout, NULL, _IOLBF, 0);
+    if (open_all(&daemon) && start(&daemon)) {
+        run(&daemon);
+        say(&daemon, PDCPD_LOG_INFO, "ends");
+        status = EXIT_SUCCESS;
+    }
+    close_all(&daemon);
+    return status;
+}

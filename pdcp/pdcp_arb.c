@@ -1,0 +1,468 @@
+#include "pdcp_arb.h"
+
+#include <stddef.h>
+#include <string.h>
+
+#include "pdcp_setup.h"
+#include "pdcp_time.h"
+
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, pdcp_event_fn on_event, void *ctx)
+{
+    memset(arb, 0, sizeof *arb);
+    pdcp_nodes_init(&arb->bus.nodes);
+    pdcp_timers_init(&arb->bus.timers);
+    pdcp_txq_init(&arb->bus.txq);
+    pdcp_bind_init(&arb->bind);
+    pdcp_link_init(&arb->link);
+    arb->bus.on_event = on_event;
+    arb->bus.event_ctx = ctx;
+    arb->started_ms = now_ms;
+    pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms);
+}
+
+static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
+{
+    pdcp_bus_count(&arb->bus, stat);
+}
+
+static pdcp_node_t *node_of(pdcp_arb_t *arb, uint8_t node)
+{
+    return &arb->bus.nodes.nodes[node];
+}
+
+static uint32_t silence_ms(const pdcp_node_t *node)
+{
+    return (uint32_t)node->beacon_ms * PDCP_BEACONS_MISSED;
+}
+
+static void set_life(pdcp_arb_t *arb, uint8_t node, uint32_t deadline_ms)
+{
+    pdcp_timers_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_LIFE + node), deadline_ms);
+}
+
+static void host_ends(pdcp_arb_t *arb, uint32_t now_ms, pdcp_status_t status)
+{
+    arb->host.active = false;
+    arb->host.waiting = false;
+    const pdcp_event_t event = {.kind = PDCP_EVENT_REQUEST,
+                                .node = arb->host.node,
+                                .channel = arb->host.channel,
+                                .status = (int8_t)status,
+                                .len = arb->host.len};
+    arb->bus.on_event(arb->bus.event_ctx, now_ms, &event);
+}
+
+/* Takes a device out of service: whoever waits for it learns that it does not answer, its links become
+ * inactive. */
+static void take_down(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    device->state = PDCP_NODE_LOST;
+    device->setup_due = false;
+    pdcp_request_cancel(&arb->bus, node);
+    pdcp_link_on_lost(&arb->link, &arb->bus, now_ms, node);
+    if (arb->host.active && arb->host.node == node) {
+        host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
+    }
+}
+
+static void begin_setup(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    device->setup_attempts = 0;
+    device->heard_ms = now_ms;
+    pdcp_setup_start(&arb->bus, node);
+    set_life(arb, node, now_ms + silence_ms(device));
+}
+
+static void tell_lost(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    if (node_of(arb, node)->beaconed) {
+        node_of(arb, node)->beaconed = false;
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_LOST, node, PDCP_NONE, PDCP_OK);
+    }
+}
+
+static void after_bind(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_bind_result_t result)
+{
+    if (result != PDCP_BIND_GRANTED) {
+        return;
+    }
+    if (node_of(arb, node)->state != PDCP_NODE_LOST) {
+        take_down(arb, now_ms, node); /* it was reset: what was known of its channels' state is gone */
+        tell_lost(arb, now_ms, node);
+    }
+    begin_setup(arb, now_ms, node);
+}
+
+static void start_host_request(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    pdcp_host_request_t *host = &arb->host;
+    if (!host->waiting || !pdcp_request_is_idle(&arb->bus, host->node)) {
+        return;
+    }
+    host->waiting = false;
+    if (host->set) {
+        pdcp_request_set(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
+                         host->bytes, host->size);
+    } else {
+        pdcp_request_get(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
+                         host->size);
+    }
+}
+
+/* A device's place may have become free for its next request: the check of its identity comes first, then the
+ * host, then its setup. */
+static void serve(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    if (arb->host.waiting && arb->host.node == node && !device->asked_again) {
+        start_host_request(arb, now_ms);
+    }
+    if (!pdcp_request_is_idle(&arb->bus, node)) {
+        return;
+    }
+    if (device->asked_again) {
+        pdcp_request_get(&arb->bus, now_ms, node, PDCP_CLIENT_BIND, 0, PDCP_DEV_VID_PID, PDCP_VALUE_MAX);
+        pdcp_request_try_once(&arb->bus, node);
+        return;
+    }
+    if (device->state != PDCP_NODE_SETUP) {
+        return;
+    }
+    if (!device->setup_due && !pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node))) {
+        pdcp_setup_start(&arb->bus, node); /* another request came in the pause after a failed attempt */
+    }
+    if (device->setup_due) {
+        pdcp_setup_ask(&arb->bind, &arb->bus, now_ms, node);
+    }
+}
+
+static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+{
+    pdcp_msg_t msg;
+    const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
+    if (msg.code != PDCP_BIND_DEVICE) {
+        count(arb, PDCP_STAT_DROP_BINDING);
+        return;
+    }
+    if (decoded != PDCP_DECODE_OK) {
+        count(arb, PDCP_STAT_DROP_BAD_DLC);
+        return;
+    }
+    uint8_t node;
+    const pdcp_bind_result_t result =
+        pdcp_bind_on_request(&arb->bind, &arb->bus, now_ms, &msg.identity, pdcp_id_node(frame->id), &node);
+    after_bind(arb, now_ms, node, result);
+    if (node != PDCP_NONE) {
+        serve(arb, now_ms, node);
+    }
+}
+
+/* A device that this arbitrator does not know beacons: it is told to reset and will then bind (D-BUS-15). */
+static void on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+{
+    const uint8_t id = pdcp_id_node(frame->id);
+    const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
+    count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
+    if (!is_beacon || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX ||
+        pdcp_time_before(now_ms, arb->started_ms + PDCP_STRANGER_QUIET_MS)) {
+        return;
+    }
+    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
+        if (arb->strangers[i].node_id == id && pdcp_time_before(now_ms, arb->strangers[i].until_ms)) {
+            return;
+        }
+    }
+    pdcp_stranger_t *entry = &arb->strangers[arb->next_stranger];
+    arb->next_stranger = (uint8_t)((arb->next_stranger + 1u) % PDCP_STRANGERS_MAX);
+    entry->node_id = id;
+    entry->until_ms = now_ms + PDCP_STRANGER_PAUSE_MS;
+    const pdcp_msg_t reset = {.code = PDCP_RESET};
+    if (pdcp_bus_send(&arb->bus, PDCP_PRIORITY_NORMAL, id, &reset)) {
+        count(arb, PDCP_STAT_STRANGER_RESET);
+    }
+}
+
+static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
+        count(arb, PDCP_STAT_DROP_UNUSED_ID);
+    } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && frame->dlc == 1 &&
+               frame->data[0] == PDCP_BEACON) {
+        count(arb, PDCP_STAT_FOREIGN_BEACON);
+    } else {
+        count(arb, PDCP_STAT_DROP_ARBITRATOR);
+    }
+}
+
+static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    switch ((can_frame_kind_t)frame->kind) {
+    case CAN_FRAME_EXTENDED:
+        count(arb, PDCP_STAT_DROP_EXTENDED);
+        break;
+    case CAN_FRAME_REMOTE:
+        count(arb, PDCP_STAT_DROP_REMOTE);
+        break;
+    case CAN_FRAME_ERROR:
+        count(arb, PDCP_STAT_DROP_ERROR);
+        break;
+    default:
+        count(arb, PDCP_STAT_DROP_FD);
+        break;
+    }
+}
+
+static void on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    if (device->state == PDCP_NODE_LOST) {
+        begin_setup(arb, now_ms, node); /* reads who it is before anything else (D-BUS-15) */
+        serve(arb, now_ms, node);
+    }
+    if (!device->beaconed) {
+        device->beaconed = true;
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_BOUND, node, PDCP_NONE, PDCP_OK);
+    }
+}
+
+static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
+{
+    pdcp_host_request_t *host = &arb->host;
+    if (!host->set && reply->len != 0 && reply->offset + reply->len <= host->size) {
+        memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
+        host->len = (uint16_t)(reply->offset + reply->len);
+    }
+    if (reply->done) {
+        host_ends(arb, now_ms, (pdcp_status_t)reply->status);
+    }
+}
+
+/* Any answer of a device whose identity has asked again shows that the asking one is another (D-BUS-6). */
+static void conclude_check(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+{
+    if (!node_of(arb, node)->asked_again || !reply->done) {
+        return;
+    }
+    const bool answered = reply->status != PDCP_ERR_NO_ANSWER;
+    const pdcp_bind_result_t result = pdcp_bind_after_check(&arb->bind, &arb->bus, now_ms, node, answered);
+    after_bind(arb, now_ms, node, result);
+}
+
+static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+{
+    switch ((pdcp_client_t)reply->client) {
+    case PDCP_CLIENT_SETUP:
+        pdcp_setup_on_reply(&arb->bus, now_ms, node, reply);
+        if (reply->done && node_of(arb, node)->state == PDCP_NODE_READY) {
+            pdcp_link_on_ready(&arb->link, &arb->bus, node);
+        }
+        break;
+    case PDCP_CLIENT_LINK:
+        pdcp_link_on_reply(&arb->link, &arb->bus, now_ms, reply);
+        break;
+    case PDCP_CLIENT_HOST:
+        host_on_reply(arb, now_ms, reply);
+        break;
+    default:
+        break;
+    }
+    conclude_check(arb, now_ms, node, reply);
+}
+
+static bool is_from_device(uint8_t code)
+{
+    return (code & PDCP_ANSWER) != 0
+               ? code != (PDCP_BIND_DEVICE | PDCP_ANSWER) && code != (PDCP_UPDATE_CHANNEL | PDCP_ANSWER)
+               : code == PDCP_BULK_DATA || code == PDCP_UPDATE_CHANNEL;
+}
+
+static bool is_deprecated(uint8_t code)
+{
+    const uint8_t request = (uint8_t)(code & 0x7Fu);
+    return request == PDCP_GET_DEVICE_INFO ||
+           (request >= PDCP_IND_GET_PARAMETER && request <= PDCP_SET_NODE_ID);
+}
+
+static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can_frame_t *frame)
+{
+    pdcp_msg_t msg;
+    pdcp_reply_t reply;
+    const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
+    if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
+        count(arb, PDCP_STAT_DROP_BAD_CODE);
+    } else if (decoded == PDCP_DECODE_BAD_DLC) {
+        count(arb, PDCP_STAT_DROP_BAD_DLC);
+    } else if (is_deprecated(msg.code)) {
+        count(arb, PDCP_STAT_DROP_DEPRECATED);
+    } else if (msg.code == PDCP_BEACON) {
+        on_beacon(arb, now_ms, node);
+    } else if (!is_from_device(msg.code)) {
+        count(arb, PDCP_STAT_DROP_DIRECTION);
+    } else if (msg.code == PDCP_UPDATE_CHANNEL) {
+        pdcp_link_on_update(&arb->link, &arb->bus, node, msg.channel);
+    } else if (pdcp_request_on_message(&arb->bus, now_ms, node, &msg, &reply)) {
+        on_reply(arb, now_ms, node, &reply);
+        serve(arb, now_ms, node);
+    }
+}
+
+void pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+{
+    count(arb, PDCP_STAT_RX);
+    if (frame->kind != CAN_FRAME_BASE) {
+        on_other_kind(arb, frame);
+        return;
+    }
+    if (pdcp_id_from_arbitrator(frame->id)) {
+        on_arbitrator_frame(arb, frame);
+        return;
+    }
+    if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
+        on_bind_frame(arb, now_ms, frame);
+        return;
+    }
+    uint8_t node;
+    const bool is_device = pdcp_nodes_owner(&arb->bus.nodes, pdcp_id_node(frame->id), &node);
+    if (node >= PDCP_DEVICES_MAX) {
+        on_stranger(arb, now_ms, frame);
+        return;
+    }
+    node_of(arb, node)->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
+    if (!is_device) {
+        count(arb, PDCP_STAT_CHANNEL_DATA);
+        return;
+    }
+    if (frame->dlc == 1 && frame->data[0] == PDCP_BEACON) {
+        on_beacon(arb, now_ms, node); /* by far the most frequent: without decoding */
+        return;
+    }
+    on_message(arb, now_ms, node, frame);
+}
+
+static void send_beacon(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    const pdcp_msg_t beacon = {.code = PDCP_BEACON};
+    (void)pdcp_bus_send(&arb->bus, PDCP_PRIORITY_HIGH, PDCP_NODE_BROADCAST, &beacon);
+    pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms + PDCP_BEACON_MS);
+}
+
+static void on_life_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    const uint32_t lost_ms = device->heard_ms + silence_ms(device);
+    if (device->state == PDCP_NODE_LOST) {
+        pdcp_nodes_remove(&arb->bus.nodes, node);
+    } else if (pdcp_time_before(now_ms, lost_ms)) {
+        set_life(arb, node, lost_ms);
+    } else {
+        count(arb, PDCP_STAT_LOST);
+        take_down(arb, now_ms, node);
+        device->asked_again = false;
+        set_life(arb, node, now_ms + PDCP_LOST_KEPT_MS);
+        tell_lost(arb, now_ms, node);
+    }
+}
+
+static void on_request_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    pdcp_reply_t reply;
+    if (pdcp_request_on_deadline(&arb->bus, now_ms, node, &reply)) {
+        on_reply(arb, now_ms, node, &reply);
+    }
+    serve(arb, now_ms, node);
+}
+
+static void on_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t timer)
+{
+    if (timer == PDCP_TIMER_BEACON) {
+        send_beacon(arb, now_ms);
+    } else if (timer >= PDCP_TIMER_LIFE) {
+        on_life_deadline(arb, now_ms, (uint8_t)(timer - PDCP_TIMER_LIFE));
+    } else {
+        on_request_deadline(arb, now_ms, timer);
+    }
+}
+
+uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    uint8_t timer;
+    while (pdcp_timers_take_due(&arb->bus.timers, now_ms, &timer)) {
+        on_deadline(arb, now_ms, timer);
+    }
+    if (arb->host.waiting) {
+        start_host_request(arb, now_ms);
+    }
+    pdcp_link_step(&arb->link, &arb->bus, now_ms);
+    return pdcp_timers_next_ms(&arb->bus.timers, now_ms);
+}
+
+const can_frame_t *pdcp_arb_tx_peek(const pdcp_arb_t *arb)
+{
+    return pdcp_txq_peek(&arb->bus.txq);
+}
+
+void pdcp_arb_tx_pop(pdcp_arb_t *arb)
+{
+    pdcp_txq_pop(&arb->bus.txq);
+    count(arb, PDCP_STAT_TX);
+}
+
+static pdcp_status_t host_request(pdcp_arb_t *arb, const pdcp_host_request_t *request)
+{
+    if (request->node >= PDCP_DEVICES_MAX) {
+        return PDCP_ERR_UNKNOWN;
+    }
+    const uint8_t state = node_of(arb, request->node)->state;
+    if (state == PDCP_NODE_FREE || state == PDCP_NODE_LOST) {
+        return PDCP_ERR_UNKNOWN;
+    }
+    if (arb->host.active) {
+        return PDCP_ERR_BUSY;
+    }
+    arb->host = *request;
+    arb->host.active = true;
+    arb->host.waiting = true;
+    return PDCP_OK;
+}
+
+pdcp_status_t pdcp_arb_get(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
+                           uint16_t size)
+{
+    const pdcp_host_request_t request = {
+        .node = node, .channel = channel, .param = param, .bytes = bytes, .size = size};
+    return host_request(arb, &request);
+}
+
+pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
+                           uint16_t size)
+{
+    const pdcp_host_request_t request = {
+        .set = true, .node = node, .channel = channel, .param = param, .bytes = bytes, .size = size};
+    return host_request(arb, &request);
+}
+
+pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+{
+    const pdcp_channel_t *channels = arb->bus.nodes.channels;
+    if (output >= PDCP_CHANNELS_MAX || input >= PDCP_CHANNELS_MAX || channels[output].node == PDCP_NONE ||
+        channels[input].node == PDCP_NONE || channels[output].transfer != PDCP_OUTPUT ||
+        channels[input].transfer != PDCP_INPUT) {
+        return PDCP_ERR_UNKNOWN;
+    }
+    if (channels[output].node == channels[input].node) {
+        return PDCP_ERR_OWN;
+    }
+    return pdcp_link_wish(&arb->link, output, input) ? PDCP_OK : PDCP_ERR_BUSY;
+}
+
+bool pdcp_arb_setup_running(const pdcp_arb_t *arb)
+{
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (arb->bus.nodes.nodes[i].state == PDCP_NODE_SETUP) {
+            return true;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,81 @@
+/* The bus arbitrator: frames and time go in, frames and the next deadline come out.
+ *
+ * After every call that hands something in, the caller calls pdcp_arb_step and then takes the frames that
+ * wait to be sent with pdcp_arb_tx_peek and pdcp_arb_tx_pop. Everything is single-threaded; several
+ * arbitrators fit one process. now_ms may stand still but never runs backwards; it wraps (pdcp_time.h).
+ *
+ * The tables may be read at any time (arb->bus.nodes, arb->bus.stats); only the functions here change them.
+ */
+#ifndef PDCP_ARB_H
+#define PDCP_ARB_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "can_frame.h"
+#include "pdcp_bind.h"
+#include "pdcp_bus.h"
+#include "pdcp_link.h"
+
+/* The host's request for a parameter; one at a time. */
+typedef struct {
+    bool active;
+    bool waiting; /* for the device's place */
+    bool set;     /* else get */
+    uint8_t node;
+    uint8_t channel;
+    uint8_t param;
+    uint8_t *bytes; /* the application's, size bytes of room or of value */
+    uint16_t size;
+    uint16_t len; /* got so far */
+} pdcp_host_request_t;
+
+/* An id that is not bound and was told to reset (D-BUS-15). */
+typedef struct {
+    uint8_t node_id;
+    uint32_t until_ms;
+} pdcp_stranger_t;
+
+#define PDCP_STRANGERS_MAX 8
+
+typedef struct {
+    pdcp_bus_t bus;
+    pdcp_bind_t bind;
+    pdcp_link_t link;
+    pdcp_host_request_t host;
+    pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
+    uint8_t next_stranger;
+    uint32_t started_ms;
+} pdcp_arb_t;
+
+/* on_event: see pdcp_bus.h. The first beacon is due at once. */
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, pdcp_event_fn on_event, void *ctx);
+
+/* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. */
+void pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame);
+
+/* Does what is due. Returns the absolute time at which it is to be called again at the latest. */
+uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms);
+
+/* The frame that leaves next, NULL: none. Valid until the next call of any other function. */
+const can_frame_t *pdcp_arb_tx_peek(const pdcp_arb_t *arb);
+void pdcp_arb_tx_pop(pdcp_arb_t *arb);
+
+/* Gets or sets a parameter for the host; works from binding on. bytes[] must live until PDCP_EVENT_REQUEST.
+ * Getting: size is the room, and the event's len what has come. Setting: size is the length, at least 1.
+ * PDCP_OK: the event will come, once. PDCP_ERR_BUSY: another one is under way. PDCP_ERR_UNKNOWN: no such
+ * device. */
+pdcp_status_t pdcp_arb_get(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
+                           uint16_t size);
+pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
+                           uint16_t size);
+
+/* Makes exactly this link (2307h), both ends by their channel numbers. PDCP_OK: PDCP_EVENT_WISH will come,
+ * once. PDCP_ERR_UNKNOWN: wrong direction; PDCP_ERR_OWN: same device; PDCP_ERR_BUSY: another one is under
+ * way. */
+pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input);
+
+/* Is a device being set up? */
+bool pdcp_arb_setup_running(const pdcp_arb_t *arb);
+
+#endif

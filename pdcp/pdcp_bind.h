@@ -1,0 +1,61 @@
+/* Binding (pdcp-bus.md 3, D-BUS-6): which node id a device gets.
+ *
+ * Remembers identities with their ids, most recently used first; the application keeps that list in
+ * non-volatile memory and gives it back at start-up. Ids that were suggested are reserved until their device
+ * asks with them or the time is over. */
+#ifndef PDCP_BIND_H
+#define PDCP_BIND_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_bus.h"
+
+typedef struct {
+    pdcp_identity_t identity;
+    uint8_t node_id;
+} pdcp_remembered_t;
+
+typedef struct {
+    pdcp_identity_t identity;
+    uint8_t node_id; /* 0: this entry is free */
+    uint32_t until_ms;
+} pdcp_reserved_t;
+
+typedef struct {
+    pdcp_remembered_t remembered[PDCP_IDENTITIES_MAX];
+    uint8_t remembered_count;
+    pdcp_reserved_t reserved[PDCP_RESERVED_MAX];
+} pdcp_bind_t;
+
+/* What came of a bind request. */
+typedef enum {
+    PDCP_BIND_GRANTED,   /* node holds the device's place, new or taken back */
+    PDCP_BIND_SUGGESTED, /* it has to ask again */
+    PDCP_BIND_REFUSED,   /* no node id or no place is left */
+    PDCP_BIND_CHECK      /* its identity is bound: find out whether that device still answers, then see
+                            pdcp_bind_after_check */
+} pdcp_bind_result_t;
+
+void pdcp_bind_init(pdcp_bind_t *bind);
+
+/* Adds an identity behind those that are there, as they come from non-volatile memory, most recently used
+ * first. Entries with an invalid or already remembered id, a repeated identity, or beyond the room are left
+ * out: false. */
+bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry);
+
+/* A bind request with node id asked. Answers it, unless the result is PDCP_BIND_CHECK. */
+pdcp_bind_result_t pdcp_bind_on_request(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms,
+                                        const pdcp_identity_t *identity, uint8_t asked, uint8_t *node);
+
+/* The check of a bound device is over. It answered: the asking device is another one, refuse it with id 0. It
+ * did not: it was reset and is granted its id again (or suggested it). Answers the request that
+ * pdcp_bind_on_request left open. */
+pdcp_bind_result_t pdcp_bind_after_check(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node,
+                                         bool answered);
+
+/* A node id for an output channel: free, not reserved, and while there is one, not remembered for a device.
+ * Highest first, since devices tend to ask for low ones. 0: none is left. */
+uint8_t pdcp_bind_output_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms);
+
+#endif

@@ -1,0 +1,19 @@
+#include "pdcp_bus.h"
+
+bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg)
+{
+    can_frame_t frame;
+    pdcp_encode(pdcp_can_id(priority, true, node_id), msg, &frame);
+    if (!pdcp_txq_put(&bus->txq, &frame)) {
+        pdcp_bus_count(bus, PDCP_STAT_TX_FULL);
+        return false;
+    }
+    return true;
+}
+
+void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
+                   pdcp_status_t status)
+{
+    const pdcp_event_t event = {.kind = kind, .node = node, .channel = channel, .status = (int8_t)status};
+    bus->on_event(bus->event_ctx, now_ms, &event);
+}

@@ -1,0 +1,58 @@
+/* What every part of the arbitrator shares: tables, deadlines, transmit queue, counters, and the way to tell
+ * the application what has happened. Only the files of the arbitrator (pdcp_bind, _request, _setup, _link,
+ * _arb) use this. */
+#ifndef PDCP_BUS_H
+#define PDCP_BUS_H
+
+#include "pdcp_codec.h"
+#include "pdcp_nodes.h"
+#include "pdcp_stats.h"
+#include "pdcp_timer.h"
+#include "pdcp_txq.h"
+
+typedef enum {
+    PDCP_EVENT_BOUND,        /* node: first beacon of a device, it counts from now on */
+    PDCP_EVENT_READY,        /* node: its setup has ended well */
+    PDCP_EVENT_SETUP_FAILED, /* node: it stays bound but unlinked */
+    PDCP_EVENT_LOST,         /* node: silent for three beacon intervals */
+    PDCP_EVENT_REFUSED,      /* a device was refused: no node id or no place left */
+    PDCP_EVENT_DUPLICATE,    /* node: a second device claims its identity and was refused */
+    PDCP_EVENT_IDENTITIES,   /* the table of remembered identities has changed */
+    PDCP_EVENT_LINK,   /* channel (an input): its link has changed; status: PDCP_OK or why it was not made */
+    PDCP_EVENT_WISH,   /* channel: the link that the host asked for is made, or status says why not */
+    PDCP_EVENT_REQUEST /* node: the host's request has ended with status; len bytes of value */
+} pdcp_event_kind_t;
+
+typedef struct {
+    pdcp_event_kind_t kind;
+    uint8_t node;
+    uint8_t channel;
+    int8_t status; /* pdcp_status_t */
+    uint16_t len;
+} pdcp_event_t;
+
+/* Called from inside the arbitrator's functions, in the order in which things happen. Must not call back into
+ * the arbitrator but to read its tables; the event is valid during the call. */
+typedef void (*pdcp_event_fn)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
+
+typedef struct pdcp_bus {
+    pdcp_nodes_t nodes;
+    pdcp_timers_t timers;
+    pdcp_txq_t txq;
+    uint32_t stats[PDCP_STAT_COUNT];
+    pdcp_event_fn on_event;
+    void *event_ctx;
+} pdcp_bus_t;
+
+static inline void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
+{
+    bus->stats[stat]++;
+}
+
+/* Puts a message from the arbitrator into the transmit queue. False: the queue is full, which is counted. */
+bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
+
+void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
+                   pdcp_status_t status);
+
+#endif

@@ -1,0 +1,631 @@
+#include "pdcp_link.h"
+
+#include <stddef.h>
+#include <string.h>
+
+/* Steps of a job in the order of making a link; undoing and removing run through them backwards. */
+typedef enum {
+    STEP_READ_VID_PID, /* Update Data Channel: what source the device names */
+    STEP_READ_SERIAL,
+    STEP_INPUT_OFF, /* before its source is replaced */
+    STEP_VID_PID,
+    STEP_SERIAL,
+    STEP_TYPE,
+    STEP_NODES,
+    STEP_INPUT_ON,
+    STEP_OUTPUT_ON,
+    STEP_END
+} step_t;
+
+void pdcp_link_init(pdcp_link_t *link)
+{
+    memset(link, 0, sizeof *link);
+    link->wish_input = PDCP_NONE;
+    link->at = PDCP_NONE;
+}
+
+static pdcp_channel_t *channel_of(pdcp_bus_t *bus, uint8_t channel)
+{
+    return channel != PDCP_NONE ? &bus->nodes.channels[channel] : NULL;
+}
+
+static bool is_ready(const pdcp_bus_t *bus, uint8_t channel)
+{
+    const uint8_t node = channel != PDCP_NONE ? bus->nodes.channels[channel].node : PDCP_NONE;
+    return node != PDCP_NONE && bus->nodes.nodes[node].state == PDCP_NODE_READY;
+}
+
+static bool is_unconnected(const pdcp_channel_t *input)
+{
+    return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
+}
+
+static void put_todo(pdcp_link_t *link, pdcp_channel_t *channel, pdcp_todo_t todo)
+{
+    channel->todo = (uint8_t)todo;
+    link->due = true;
+}
+
+/* The output that an input names as its source, if its device is set up. */
+static uint8_t find_source(const pdcp_bus_t *bus, const pdcp_channel_t *input)
+{
+    if (is_unconnected(input)) {
+        return PDCP_NONE;
+    }
+    const uint8_t node = pdcp_nodes_find(&bus->nodes, &input->source);
+    if (node == PDCP_NONE || node == input->node || bus->nodes.nodes[node].state != PDCP_NODE_READY) {
+        return PDCP_NONE;
+    }
+    const uint8_t channel = pdcp_nodes_channel(&bus->nodes, node, input->source_index);
+    return channel != PDCP_NONE && bus->nodes.channels[channel].transfer == PDCP_OUTPUT ? channel : PDCP_NONE;
+}
+
+/* An output that no active link needs any more is to be disabled; the job's own link counts as needing it. */
+static void release_output(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t output)
+{
+    if (!is_ready(bus, output) || !bus->nodes.channels[output].enabled) {
+        return;
+    }
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *input = &bus->nodes.channels[i];
+        if (input->node != PDCP_NONE && input->feed == output && input->link == PDCP_LINK_ACTIVE) {
+            return;
+        }
+    }
+    put_todo(link, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
+}
+
+bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input)
+{
+    if (link->wish_input != PDCP_NONE) {
+        return false;
+    }
+    link->wish_input = input;
+    link->wish_output = output;
+    link->due = true;
+    return true;
+}
+
+void pdcp_link_remove(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t input)
+{
+    put_todo(link, &bus->nodes.channels[input], PDCP_TODO_REMOVE);
+}
+
+static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, uint8_t result)
+{
+    const pdcp_msg_t msg = {.code = PDCP_UPDATE_CHANNEL | PDCP_ANSWER, .result = result, .channel = index};
+    (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, bus->nodes.nodes[node].node_id, &msg);
+}
+
+void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8_t index)
+{
+    const uint8_t number = pdcp_nodes_channel(&bus->nodes, node, index);
+    const uint8_t state = bus->nodes.nodes[node].state;
+    if (state == PDCP_NODE_SETUP) {
+        if (number != PDCP_NONE) {
+            put_todo(link, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
+        }
+        return; /* without a channel yet: the device asks again */
+    }
+    if (state != PDCP_NODE_READY || number == PDCP_NONE ||
+        bus->nodes.channels[number].transfer != PDCP_INPUT) {
+        answer_update(bus, node, index, PDCP_FAILURE);
+        return;
+    }
+    put_todo(link, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
+}
+
+void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        pdcp_channel_t *input = &bus->nodes.channels[i];
+        if (input->node == PDCP_NONE || input->link != PDCP_LINK_INACTIVE) {
+            continue;
+        }
+        input->feed = find_source(bus, input);
+        const bool concerned = input->node == node ||
+                               (input->feed != PDCP_NONE && bus->nodes.channels[input->feed].node == node);
+        if (concerned && input->feed != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
+            put_todo(link, input, PDCP_TODO_CONNECT);
+        }
+    }
+    link->due = true; /* an Update Data Channel may have waited for the end of the setup */
+}
+
+/* The input's own end of a link is gone, or its source is. */
+static void deactivate(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t number, bool input_gone)
+{
+    pdcp_channel_t *input = &bus->nodes.channels[number];
+    input->link = PDCP_LINK_INACTIVE;
+    if (input_gone) {
+        release_output(link, bus, input->feed);
+    } else {
+        put_todo(link, input, PDCP_TODO_SILENCE);
+    }
+    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
+}
+
+/* The job under way goes on without the channels of a device that is gone. */
+static void leave_job(pdcp_link_t *link, const pdcp_bus_t *bus, uint8_t node)
+{
+    if (!link->active) {
+        return;
+    }
+    if (link->input != PDCP_NONE && bus->nodes.channels[link->input].node == node) {
+        link->input = PDCP_NONE;
+    }
+    if (link->output != PDCP_NONE && bus->nodes.channels[link->output].node == node) {
+        link->output = PDCP_NONE;
+    }
+    if (link->at == node) {
+        link->at = PDCP_NONE;
+        link->waiting = true;
+    }
+}
+
+void pdcp_link_on_lost(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        pdcp_channel_t *channel = &bus->nodes.channels[i];
+        if (channel->node == PDCP_NONE) {
+            continue;
+        }
+        const bool own = channel->node == node;
+        const bool fed = channel->feed != PDCP_NONE && bus->nodes.channels[channel->feed].node == node;
+        if (own) {
+            channel->enabled = false;
+            channel->todo = PDCP_TODO_NONE;
+        }
+        if (channel->link == PDCP_LINK_ACTIVE && (own || fed)) {
+            deactivate(link, bus, now_ms, i, own);
+        }
+    }
+    leave_job(link, bus, node);
+}
+
+static bool is_input_step(uint8_t step)
+{
+    return step != STEP_OUTPUT_ON;
+}
+
+/* What a step writes: the parameter, and its value in bytes[]. Returns the length; 0: nothing is to be
+ * written. */
+static uint8_t value_of(const pdcp_link_t *link, pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
+{
+    const pdcp_channel_t *input = channel_of(bus, link->input);
+    const pdcp_channel_t *output = channel_of(bus, link->output);
+    memset(bytes, 0, PDCP_VALUE_MAX);
+    switch ((step_t)link->step) {
+    case STEP_INPUT_OFF:
+        *param = PDCP_CH_ENABLED;
+        return input->enabled && !link->undoing ? 1 : 0;
+    case STEP_VID_PID:
+        *param = PDCP_IN_SOURCE_VID_PID;
+        pdcp_put_u16(&bytes[0], input->source.vid);
+        pdcp_put_u16(&bytes[2], input->source.pid);
+        return 4;
+    case STEP_SERIAL:
+        *param = PDCP_IN_SOURCE_SERIAL;
+        pdcp_put_u16(&bytes[0], input->source.sn);
+        bytes[2] = input->source_index;
+        return 3;
+    case STEP_TYPE:
+        *param = PDCP_IN_SOURCE_TYPE;
+        pdcp_put_u16(&bytes[0], input->source_type);
+        pdcp_put_u16(&bytes[2], input->source_profile);
+        return 4;
+    case STEP_NODES:
+        *param = PDCP_IN_SOURCE_NODES;
+        if (!link->undoing) {
+            bytes[0] = bus->nodes.nodes[output->node].node_id;
+            bytes[1] = output->node_id;
+        }
+        return 2;
+    case STEP_INPUT_ON:
+    case STEP_OUTPUT_ON:
+        *param = PDCP_CH_ENABLED;
+        bytes[0] = link->undoing ? 0 : 1;
+        return link->step == STEP_OUTPUT_ON && link->output_was_on ? 0 : 1;
+    default:
+        return 0;
+    }
+}
+
+static void take_old(pdcp_link_t *link, const pdcp_channel_t *input)
+{
+    link->old_source = input->source;
+    link->old_index = input->source_index;
+    link->old_type = input->source_type;
+    link->old_profile = input->source_profile;
+    link->old_link = input->link;
+    link->old_feed = input->feed;
+}
+
+static void give_back_old(const pdcp_link_t *link, pdcp_channel_t *input)
+{
+    input->source = link->old_source;
+    input->source_index = link->old_index;
+    input->source_type = link->old_type;
+    input->source_profile = link->old_profile;
+    input->link = link->old_link;
+    input->feed = link->old_feed;
+}
+
+static void name_source(pdcp_link_t *link, pdcp_bus_t *bus)
+{
+    pdcp_channel_t *input = channel_of(bus, link->input);
+    const pdcp_channel_t *output = channel_of(bus, link->output);
+    input->source = bus->nodes.nodes[output->node].identity;
+    input->source_index = output->index;
+    input->source_type = output->type;
+    input->source_profile = output->profile;
+    input->feed = link->output;
+    input->link = PDCP_LINK_INACTIVE;
+    link->output_was_on = output->enabled;
+}
+
+static void begin(pdcp_link_t *link, pdcp_todo_t kind, uint8_t input, uint8_t output, step_t step)
+{
+    link->active = true;
+    link->waiting = true;
+    link->at = PDCP_NONE;
+    link->kind = (uint8_t)kind;
+    link->input = input;
+    link->output = output;
+    link->step = (uint8_t)step;
+    link->undoing = kind == PDCP_TODO_SILENCE || kind == PDCP_TODO_REMOVE;
+    link->once = false;
+    link->for_host = false;
+    link->output_was_on = false;
+    link->status = PDCP_OK;
+}
+
+static void tell_link(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    if (link->input != PDCP_NONE) {
+        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, bus->nodes.channels[link->input].node, link->input,
+                      (pdcp_status_t)link->status);
+    }
+    if (link->for_host) {
+        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->input, (pdcp_status_t)link->status);
+    }
+}
+
+/* The link of an input could not be made: it is what it was before, or remembered as inactive; one that
+ * worked is made anew. */
+static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus)
+{
+    pdcp_channel_t *input = channel_of(bus, link->input);
+    pdcp_bus_count(bus, PDCP_STAT_LINK_FAILED);
+    if (input == NULL) {
+        return;
+    }
+    input->feed = find_source(bus, input);
+    if (link->old_link == PDCP_LINK_ACTIVE) {
+        input->link = PDCP_LINK_INACTIVE;
+        put_todo(link, input, PDCP_TODO_CONNECT);
+    }
+}
+
+static void settle_made(pdcp_link_t *link, pdcp_bus_t *bus)
+{
+    bus->nodes.channels[link->input].link = PDCP_LINK_ACTIVE;
+    if (link->old_feed != link->output) {
+        release_output(link, bus, link->old_feed);
+    }
+}
+
+static void settle_removed(pdcp_link_t *link, pdcp_bus_t *bus)
+{
+    pdcp_channel_t *input = channel_of(bus, link->input);
+    if (input != NULL && link->kind == PDCP_TODO_REMOVE) {
+        input->link = PDCP_LINK_NONE;
+        input->feed = PDCP_NONE;
+        release_output(link, bus, link->old_feed);
+    }
+}
+
+static void end(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    const pdcp_channel_t *input = channel_of(bus, link->input);
+    const bool making = link->kind == PDCP_TODO_CONNECT || link->kind == PDCP_TODO_UPDATE;
+    link->active = false;
+    link->due = true;
+    if (!making) {
+        settle_removed(link, bus);
+    } else if (link->status == PDCP_OK) {
+        settle_made(link, bus);
+    } else {
+        settle_failed(link, bus);
+    }
+    if (link->kind == PDCP_TODO_UPDATE && input != NULL) {
+        answer_update(bus, input->node, input->index, link->status == PDCP_OK ? PDCP_SUCCESS : PDCP_FAILURE);
+    }
+    tell_link(link, bus, now_ms);
+}
+
+/* Nothing more is to be written forwards. Once the source was written, steps run backwards, the failed one
+ * first: whether it was carried out nobody knows. */
+static void give_up(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+{
+    pdcp_channel_t *input = channel_of(bus, link->input);
+    link->status = (int8_t)status;
+    if (input != NULL) {
+        give_back_old(link, input);
+    }
+    if (link->step < STEP_VID_PID) {
+        end(link, bus, now_ms);
+        return;
+    }
+    link->undoing = true;
+    link->last_step = STEP_VID_PID;
+}
+
+/* Update Data Channel, once 5 and 6 are read: is the source that they name on the bus? False: the job is
+ * over. */
+static bool resolve(pdcp_link_t *link, pdcp_bus_t *bus)
+{
+    pdcp_channel_t *input = channel_of(bus, link->input);
+    link->output = find_source(bus, input);
+    if (input->link == PDCP_LINK_ACTIVE && link->output == input->feed) {
+        return false;
+    }
+    input->link = is_unconnected(input) ? PDCP_LINK_NONE : PDCP_LINK_INACTIVE;
+    take_old(link, input);
+    if (link->output == PDCP_NONE) {
+        input->feed = PDCP_NONE;
+        release_output(link, bus, link->old_feed);
+        link->status = PDCP_ERR_UNKNOWN;
+        return false;
+    }
+    name_source(link, bus);
+    return true;
+}
+
+/* Moves to the step that comes next in the job's direction. False: there is none. */
+static bool advance(pdcp_link_t *link)
+{
+    if (link->undoing) {
+        if (link->step <= link->last_step) {
+            return false;
+        }
+        link->step--;
+        return true;
+    }
+    link->step++;
+    return link->step != STEP_END;
+}
+
+/* Can the current step be carried out on its device? */
+static bool step_possible(const pdcp_link_t *link, const pdcp_bus_t *bus)
+{
+    const bool needs_output = link->step == STEP_OUTPUT_ON || (link->step == STEP_NODES && !link->undoing);
+    if (needs_output && !is_ready(bus, link->output)) {
+        return false;
+    }
+    return !is_input_step(link->step) || is_ready(bus, link->input);
+}
+
+/* Sends the request of the current step. False: there is nothing to write in it. */
+static bool send_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    const uint8_t number = is_input_step(link->step) ? link->input : link->output;
+    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    if (link->step <= STEP_READ_SERIAL) {
+        const uint8_t read = link->step == STEP_READ_VID_PID ? PDCP_IN_SOURCE_VID_PID : PDCP_IN_SOURCE_SERIAL;
+        pdcp_request_get(bus, now_ms, channel->node, PDCP_CLIENT_LINK, channel->index, read, PDCP_VALUE_MAX);
+        return true;
+    }
+    uint8_t param = 0;
+    uint8_t bytes[PDCP_VALUE_MAX];
+    const uint8_t len = value_of(link, bus, &param, bytes);
+    if (len == 0) {
+        return false;
+    }
+    pdcp_request_set(bus, now_ms, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
+    if (link->once) {
+        pdcp_request_try_once(bus, channel->node);
+    }
+    return true;
+}
+
+/* Carries the job on until it waits for an answer, waits for a device's place, or is over. */
+static void run(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    while (link->active) {
+        link->waiting = false;
+        if (!step_possible(link, bus)) {
+            if (!link->undoing) {
+                give_up(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+            } else if (!advance(link)) {
+                end(link, bus, now_ms);
+            }
+            continue;
+        }
+        const uint8_t number = is_input_step(link->step) ? link->input : link->output;
+        if (!pdcp_request_is_idle(bus, bus->nodes.channels[number].node)) {
+            link->waiting = true;
+            return;
+        }
+        if (send_step(link, bus, now_ms)) {
+            link->at = bus->nodes.channels[number].node;
+            return;
+        }
+        if (!advance(link)) {
+            end(link, bus, now_ms);
+        }
+    }
+}
+
+static void took_effect(pdcp_link_t *link, pdcp_bus_t *bus, const pdcp_reply_t *reply)
+{
+    pdcp_channel_t *input = channel_of(bus, link->input);
+    const uint8_t len = (uint8_t)reply->len;
+    switch ((step_t)link->step) {
+    case STEP_READ_VID_PID:
+        input->source.vid = pdcp_value_u16(reply->bytes, len, 0);
+        input->source.pid = pdcp_value_u16(reply->bytes, len, 2);
+        break;
+    case STEP_READ_SERIAL:
+        input->source.sn = pdcp_value_u16(reply->bytes, len, 0);
+        input->source_index = pdcp_value_u8(reply->bytes, len, 2);
+        break;
+    case STEP_INPUT_OFF:
+        input->enabled = false;
+        break;
+    case STEP_INPUT_ON:
+        input->enabled = !link->undoing;
+        break;
+    case STEP_OUTPUT_ON:
+        bus->nodes.channels[link->output].enabled = !link->undoing;
+        break;
+    default:
+        break;
+    }
+}
+
+static void go_on(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    if (advance(link)) {
+        run(link, bus, now_ms);
+    } else {
+        end(link, bus, now_ms);
+    }
+}
+
+/* A step was refused or not answered. */
+static void on_failure(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+{
+    if (!link->undoing && link->step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
+        go_on(link, bus, now_ms); /* a device without the profile layer (D-BUS-20) */
+        return;
+    }
+    if (!link->undoing) {
+        link->once = status == PDCP_ERR_NO_ANSWER;
+        give_up(link, bus, now_ms, status);
+        run(link, bus, now_ms);
+        return;
+    }
+    if (status == PDCP_ERR_NO_ANSWER && is_input_step(link->step)) {
+        link->step = link->last_step; /* the rest is for the same silent device */
+    }
+    go_on(link, bus, now_ms);
+}
+
+void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, const pdcp_reply_t *reply)
+{
+    const bool gone = (is_input_step(link->step) ? link->input : link->output) == PDCP_NONE;
+    if (!reply->done || gone) {
+        return;
+    }
+    link->at = PDCP_NONE;
+    if (reply->status != PDCP_OK) {
+        on_failure(link, bus, now_ms, (pdcp_status_t)reply->status);
+        return;
+    }
+    took_effect(link, bus, reply);
+    link->once = false;
+    if (link->step == STEP_READ_SERIAL && !resolve(link, bus)) {
+        end(link, bus, now_ms);
+        return;
+    }
+    go_on(link, bus, now_ms);
+}
+
+/* Starts the job that a channel has to do, if it can be done now. */
+static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
+{
+    pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
+    channel->todo = PDCP_TODO_NONE;
+    switch (todo) {
+    case PDCP_TODO_SILENCE:
+        if (channel->transfer == PDCP_OUTPUT) {
+            begin(link, todo, PDCP_NONE, number, STEP_OUTPUT_ON);
+            link->last_step = STEP_OUTPUT_ON;
+        } else {
+            begin(link, todo, number, PDCP_NONE, STEP_INPUT_ON);
+            link->last_step = STEP_NODES;
+        }
+        break;
+    case PDCP_TODO_REMOVE:
+        begin(link, todo, number, PDCP_NONE, STEP_INPUT_ON);
+        link->last_step = STEP_VID_PID;
+        take_old(link, channel);
+        pdcp_nodes_clear_source(channel);
+        break;
+    case PDCP_TODO_CONNECT:
+        channel->feed = find_source(bus, channel);
+        if (channel->feed != PDCP_NONE && is_ready(bus, number)) {
+            begin(link, todo, number, channel->feed, STEP_INPUT_OFF);
+            take_old(link, channel);
+            name_source(link, bus);
+        }
+        break;
+    default: /* PDCP_TODO_UPDATE */
+        begin(link, todo, number, PDCP_NONE, STEP_READ_VID_PID);
+        take_old(link, channel);
+        break;
+    }
+}
+
+static void wish_ends(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+{
+    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->wish_input, status);
+    link->wish_input = PDCP_NONE;
+}
+
+static void start_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    pdcp_channel_t *input = &bus->nodes.channels[link->wish_input];
+    if (!is_ready(bus, link->wish_input) || !is_ready(bus, link->wish_output)) {
+        wish_ends(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+        return;
+    }
+    if (input->link == PDCP_LINK_ACTIVE && input->feed == link->wish_output) {
+        wish_ends(link, bus, now_ms, PDCP_OK);
+        return;
+    }
+    input->todo = PDCP_TODO_NONE;
+    begin(link, PDCP_TODO_CONNECT, link->wish_input, link->wish_output, STEP_INPUT_OFF);
+    link->for_host = true;
+    link->wish_input = PDCP_NONE;
+    take_old(link, input);
+    name_source(link, bus);
+}
+
+/* The channel that is to be seen to next: what silences comes before what connects. */
+static uint8_t next_todo(const pdcp_bus_t *bus)
+{
+    uint8_t best = PDCP_NONE;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *channel = &bus->nodes.channels[i];
+        if (channel->node == PDCP_NONE || channel->todo == PDCP_TODO_NONE ||
+            bus->nodes.nodes[channel->node].state == PDCP_NODE_SETUP) {
+            continue;
+        }
+        if (best == PDCP_NONE || channel->todo < bus->nodes.channels[best].todo) {
+            best = i;
+        }
+    }
+    return best;
+}
+
+void pdcp_link_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    if (link->active && link->waiting) {
+        run(link, bus, now_ms);
+    }
+    while (!link->active && link->due) {
+        const uint8_t next = next_todo(bus);
+        const bool urgent = next != PDCP_NONE && bus->nodes.channels[next].todo <= PDCP_TODO_REMOVE;
+        if (link->wish_input != PDCP_NONE && !urgent) {
+            start_wish(link, bus, now_ms);
+        } else if (next != PDCP_NONE) {
+            start_todo(link, bus, next);
+        } else {
+            link->due = false;
+        }
+        run(link, bus, now_ms);
+    }
+}

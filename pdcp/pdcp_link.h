@@ -1,0 +1,63 @@
+/* Links (pdcp-bus.md 7 and 8): one output feeds many inputs, an input has one source.
+ *
+ * The tables say how things should be (link, feed, todo); this file writes them to the devices, one job at a
+ * time: make a link, remove one, silence an input whose source is lost or an output that nobody listens to,
+ * resolve an Update Data Channel. A link that cannot be made is undone, in reverse. Its status is active only
+ * when its last write is answered. */
+#ifndef PDCP_LINK_H
+#define PDCP_LINK_H
+
+#include "pdcp_bus.h"
+
+typedef struct {
+    bool due;           /* some channel has something to do */
+    bool active;        /* a job is under way */
+    bool waiting;       /* the job can go on, when the device it is about has no other request under way */
+    bool undoing;       /* steps run backwards */
+    bool once;          /* the device that failed is tried once only */
+    bool for_host;      /* the host waits for the outcome */
+    uint8_t at;         /* place of the device whose answer the job waits for, PDCP_NONE: of none */
+    uint8_t kind;       /* pdcp_todo_t of the job */
+    uint8_t step;       /* pdcp_link.c */
+    uint8_t last_step;  /* of an undo */
+    uint8_t input;      /* channel number; PDCP_NONE: gone, or the job has none */
+    uint8_t output;     /* channel number; PDCP_NONE: gone, or the job has none */
+    bool output_was_on; /* before the job */
+    int8_t status;      /* outcome so far, pdcp_status_t */
+    /* The input's source before the job, to be restored when it fails. */
+    pdcp_identity_t old_source;
+    uint8_t old_index;
+    uint8_t old_link;
+    uint8_t old_feed;
+    uint16_t old_type;
+    uint16_t old_profile;
+    /* The link that the host has asked for; wish_input PDCP_NONE: none. */
+    uint8_t wish_input;
+    uint8_t wish_output;
+} pdcp_link_t;
+
+void pdcp_link_init(pdcp_link_t *link);
+
+/* Asks for exactly this link. The outcome comes as PDCP_EVENT_WISH. False: another wish is under way. */
+bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input);
+
+/* Takes the link of an input away. */
+void pdcp_link_remove(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t input);
+
+/* A device sent Update Data Channel for its channel index. */
+void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8_t index);
+
+/* A device is set up: inactive links whose other end is there are made. */
+void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node);
+
+/* A device is gone or was reset: its links become inactive, what it fed is silenced (D-BUS-14). Its request
+ * must be cancelled already; a job that was waiting for it goes on without it. */
+void pdcp_link_on_lost(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node);
+
+/* A reply to a request of PDCP_CLIENT_LINK. */
+void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, const pdcp_reply_t *reply);
+
+/* Starts what can be started. Costs nothing when there is nothing to do. */
+void pdcp_link_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms);
+
+#endif

@@ -1,0 +1,163 @@
+/* The tables of the bus: which devices there are, what channels they have, and whose every node id is.
+ *
+ * A device has a place (0 to PDCP_DEVICES_MAX - 1) from its binding until it is forgotten; its channels form
+ * a list in the order of their indices in one pool. PDCP_NONE stands for no place and no channel. Looking up
+ * a node id costs one read. Plain data: no frames, no time passes here. */
+#ifndef PDCP_NODES_H
+#define PDCP_NODES_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_limits.h"
+#include "pdcp_request.h"
+#include "pdcp_spec.h"
+
+#define PDCP_NONE 0xFFu
+
+typedef enum {
+    PDCP_NODE_FREE = 0,
+    PDCP_NODE_SETUP,  /* bound, being read and written */
+    PDCP_NODE_READY,  /* set up: its channels count */
+    PDCP_NODE_FAILED, /* bound, but its setup failed: no channels, no links */
+    PDCP_NODE_LOST    /* silent for too long: ids and links are kept for it */
+} pdcp_node_state_t;
+
+typedef struct {
+    pdcp_identity_t identity;
+    uint16_t type;
+    uint16_t profile;
+    uint16_t beacon_ms;   /* its beacon interval */
+    uint16_t ack_ms;      /* its acknowledgement time */
+    uint32_t heard_ms;    /* last frame from it */
+    uint16_t needs_at;    /* its block in the pool of needs */
+    uint8_t needs_stride; /* bytes of one set: (inputs + 7) / 8; 0: it has no block */
+    uint8_t state;        /* pdcp_node_state_t */
+    uint8_t node_id;
+    uint8_t channel_count;
+    uint8_t first_channel; /* number in the pool, PDCP_NONE: has none */
+    bool beaconed;         /* counts for the host (D-BUS-6) */
+    bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
+    uint8_t asked_id;      /* with this id */
+    bool setup_due;        /* the next request of the setup is to be sent */
+    uint8_t setup_pass;    /* pdcp_setup.c */
+    uint8_t setup_step;
+    uint8_t setup_channel;
+    uint8_t setup_attempts;
+    pdcp_request_t request;
+} pdcp_node_t;
+
+typedef enum {
+    PDCP_LINK_NONE = 0,
+    PDCP_LINK_INACTIVE = 1, /* one end missing, or not yet written (D-BUS-10) */
+    PDCP_LINK_ACTIVE = 2    /* its last write is answered */
+} pdcp_link_status_t;
+
+/* What still has to be written to a channel; carried out by pdcp_link.c, lowest first. */
+typedef enum {
+    PDCP_TODO_NONE = 0,
+    PDCP_TODO_SILENCE, /* input: its source is lost, not enabled, no node ids (D-BUS-14); output: not enabled,
+                          nobody listens */
+    PDCP_TODO_REMOVE,  /* input: back to unconnected */
+    PDCP_TODO_CONNECT, /* input: make the link to the source that it has */
+    PDCP_TODO_UPDATE   /* input: its device has sent Update Data Channel */
+} pdcp_todo_t;
+
+typedef struct {
+    uint16_t type;
+    uint16_t profile;
+    uint8_t node;     /* place of the owner; PDCP_NONE: this entry of the pool is free */
+    uint8_t index;    /* channel index, 1 to n */
+    uint8_t next;     /* the owner's next channel, PDCP_NONE: the last */
+    uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
+    uint8_t node_id;  /* outputs: 0 = none yet */
+    bool enabled;     /* transfer enabled as last written and answered */
+    uint8_t todo;     /* pdcp_todo_t */
+    /* Inputs only: */
+    uint8_t link;         /* pdcp_link_status_t */
+    uint8_t feed;         /* channel number of the source, PDCP_NONE: it is not on the bus */
+    uint8_t source_index; /* the source's channel index; PDCP_NO_SOURCE_INDEX: unconnected */
+    pdcp_identity_t source;
+    uint16_t source_type;
+    uint16_t source_profile;
+    uint16_t terminal_profile;
+} pdcp_channel_t;
+
+typedef struct {
+    pdcp_node_t nodes[PDCP_DEVICES_MAX];
+    pdcp_channel_t channels[PDCP_CHANNELS_MAX];
+    uint8_t
+        owner[256]; /* node id: 0 free; place + 1: the device's own; 80h + place + 1: of one of its outputs */
+    uint8_t needs[PDCP_NEEDS_BYTES];
+    uint16_t needs_used;
+} pdcp_nodes_t;
+
+void pdcp_nodes_init(pdcp_nodes_t *nodes);
+
+/* Place of the device with this identity, in any state but free; PDCP_NONE: there is none. */
+uint8_t pdcp_nodes_find(const pdcp_nodes_t *nodes, const pdcp_identity_t *identity);
+
+/* Is there a place for one more device? */
+bool pdcp_nodes_has_place(const pdcp_nodes_t *nodes);
+
+/* Takes a free place for a device with this node id, which must be free. PDCP_NONE: all places are taken. */
+uint8_t pdcp_nodes_add(pdcp_nodes_t *nodes, const pdcp_identity_t *identity, uint8_t node_id);
+
+/* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
+ * nothing. */
+void pdcp_nodes_remove(pdcp_nodes_t *nodes, uint8_t node);
+
+/* Gives a device exactly count channels, indices 1 to count, keeping those that it has. False: the pool is
+ * too small; nothing is changed. */
+bool pdcp_nodes_set_channels(pdcp_nodes_t *nodes, uint8_t node, uint8_t count);
+
+/* Channel number of a device's channel index; PDCP_NONE: it has no such channel. */
+uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t index);
+
+/* Makes the source of an input that of an unconnected one (D-BUS-7). */
+void pdcp_nodes_clear_source(pdcp_channel_t *input);
+
+/* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
+ * room, the device then has no needs. */
+bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
+
+/* Stores bytes of a bit string of required (desired = false) or desired channels: bit 7 of byte 0 is channel
+ * index 0 (D-BUS-8). offset: of bytes[0] in the string. Bits of channels that are no inputs of the device are
+ * dropped (D-BUS-13). */
+void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
+                          const uint8_t *bytes, uint16_t len);
+
+/* Does channel need (or desire) the input with this index of its own device? */
+bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index);
+
+/* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
+void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, uint8_t channel, uint8_t node_id);
+
+/* Is the node id the device's own (true), or that of one of its outputs (false)? node: place of the owner,
+ * PDCP_NONE: nobody has this id. */
+static inline bool pdcp_nodes_owner(const pdcp_nodes_t *nodes, uint8_t node_id, uint8_t *node)
+{
+    const uint8_t owner = nodes->owner[node_id];
+    *node = (uint8_t)((owner & 0x7Fu) - 1u);
+    return (owner & 0x80u) == 0;
+}
+
+/* A device counts from its first beacon, its channels when it is set up (D-API-6). */
+static inline bool pdcp_nodes_device_counts(const pdcp_node_t *node)
+{
+    return node->beaconed && node->state != PDCP_NODE_FREE && node->state != PDCP_NODE_LOST;
+}
+
+/* The number-th (from 1) device, input (PDCP_INPUT), output (PDCP_OUTPUT) or link that counts for the host;
+ * PDCP_NONE: there are fewer. A link is named by its input's channel number. Order: places, then channel
+ * indices. */
+uint8_t pdcp_nodes_nth_device(const pdcp_nodes_t *nodes, uint8_t number);
+uint8_t pdcp_nodes_nth_channel(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_t number);
+uint8_t pdcp_nodes_nth_link(const pdcp_nodes_t *nodes, uint8_t number);
+
+/* How many of them there are. */
+uint8_t pdcp_nodes_count_devices(const pdcp_nodes_t *nodes);
+uint8_t pdcp_nodes_count_channels(const pdcp_nodes_t *nodes, uint8_t transfer);
+uint8_t pdcp_nodes_count_links(const pdcp_nodes_t *nodes);
+
+#endif

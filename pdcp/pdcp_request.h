@@ -1,0 +1,97 @@
+/* Requests to a device (pdcp-bus.md 5): one at a time to one device, several devices at once.
+ *
+ * A request is sent, repeated after the device's acknowledgement time, PDCP_TRIES in all, and ends with
+ * exactly one reply whose done is true, unless it is cancelled. Values of more than four bytes go by bulk
+ * transfer, as does a value that the device itself wants so. Which part of the arbitrator asked (the client)
+ * travels with the request and comes back in the reply: this file decides nothing about it. */
+#ifndef PDCP_REQUEST_H
+#define PDCP_REQUEST_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_codec.h"
+
+struct pdcp_bus;
+
+typedef enum {
+    PDCP_CLIENT_NONE = 0,
+    PDCP_CLIENT_SETUP,
+    PDCP_CLIENT_LINK,
+    PDCP_CLIENT_HOST,
+    PDCP_CLIENT_BIND /* is the device with this identity still there? */
+} pdcp_client_t;
+
+typedef enum {
+    PDCP_OK = 0,
+    PDCP_ERR_NO_ANSWER = -1, /* silent through all tries, or lost meanwhile */
+    PDCP_ERR_REFUSED = -2,   /* answered with failure */
+    PDCP_ERR_BULK = -3,    /* transfer failed PDCP_BULK_RESTARTS times, or the value is longer than allowed */
+    PDCP_ERR_BUSY = -4,    /* not now: try again later */
+    PDCP_ERR_UNKNOWN = -5, /* no such device or channel, or wrong direction */
+    PDCP_ERR_OWN = -6      /* an output never feeds an input of its own device (D-API-6) */
+} pdcp_status_t;
+
+typedef enum {
+    PDCP_REQUEST_IDLE = 0,
+    PDCP_REQUEST_ANSWER,   /* sent, waiting for its answer */
+    PDCP_REQUEST_GET_SIZE, /* 0C sent, waiting for 8C */
+    PDCP_REQUEST_GET_DATA, /* waiting for the device's next 0E */
+    PDCP_REQUEST_SET_SIZE, /* 0D sent, waiting for 8D */
+    PDCP_REQUEST_SET_DATA, /* 0E sent, waiting for 8E */
+    PDCP_REQUEST_STATES
+} pdcp_request_state_t;
+
+/* Belongs to one device's place in the table. */
+typedef struct {
+    const uint8_t *bytes; /* value to be set by bulk; NULL: it is in value */
+    uint16_t size;        /* of the whole value: to be set, or as 8C says */
+    uint16_t max_size;    /* longest value that may be got */
+    uint16_t offset;      /* bytes transferred so far */
+    uint8_t state;        /* pdcp_request_state_t */
+    uint8_t client;       /* pdcp_client_t */
+    uint8_t code;         /* function code of the request */
+    uint8_t param;
+    uint8_t channel;
+    uint8_t tries_left;
+    uint8_t restarts_left;
+    uint8_t packet_id; /* next bulk packet */
+    uint8_t value[PDCP_VALUE_MAX];
+    bool got_bulk; /* idle after a bulk get: the last packet may come once more */
+} pdcp_request_t;
+
+/* What a message or a deadline has led to. */
+typedef struct {
+    uint8_t client;
+    int8_t status; /* pdcp_status_t; means something when done */
+    bool done;     /* the request has ended */
+    uint8_t code;  /* function code of the request */
+    uint8_t param;
+    uint8_t channel;
+    uint16_t offset;      /* of bytes in the value */
+    uint16_t len;         /* bytes that came now, 0 to 6 */
+    const uint8_t *bytes; /* valid during the call only */
+} pdcp_reply_t;
+
+bool pdcp_request_is_idle(const struct pdcp_bus *bus, uint8_t node);
+
+/* Start a request; the device's place must be idle. The value to be set must stay where it is until the reply
+ * when len is above 4. max_size: longest value accepted, longer ones fail with PDCP_ERR_BULK. */
+void pdcp_request_get(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
+                      uint8_t channel, uint8_t param, uint16_t max_size);
+void pdcp_request_set(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
+                      uint8_t channel, uint8_t param, const uint8_t *bytes, uint16_t len);
+
+/* Lets the request that is under way be sent no more than this once. */
+void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);
+
+/* Forgets a request without a reply. */
+void pdcp_request_cancel(struct pdcp_bus *bus, uint8_t node);
+
+/* A decoded message from a device, or the deadline of its request. True: reply says what follows. An answer
+ * that belongs to no request is counted and otherwise ignored. */
+bool pdcp_request_on_message(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
+                             pdcp_reply_t *reply);
+bool pdcp_request_on_deadline(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_reply_t *reply);
+
+#endif

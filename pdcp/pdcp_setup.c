@@ -1,0 +1,311 @@
+#include "pdcp_setup.h"
+
+#include <stddef.h>
+
+typedef enum { PASS_DEVICE, PASS_SILENCE, PASS_DIRECTION, PASS_CHANNELS } pass_t;
+
+typedef struct {
+    uint8_t param;
+    bool mandatory; /* a failure answer ends the attempt; others get defaults (pdcp-bus.md 6) */
+    bool write;
+} step_t;
+
+typedef struct {
+    const step_t *steps;
+    uint8_t count;
+} steps_t;
+
+static const step_t device_steps[] = {
+    {PDCP_DEV_VID_PID, true, false},          {PDCP_DEV_SERIAL, false, false},
+    {PDCP_DEV_TYPE_PROFILE, false, false},    {PDCP_DEV_ACK_TIME, false, false},
+    {PDCP_DEV_BEACON_INTERVAL, false, false}, {PDCP_DEV_CHANNELS, true, false},
+};
+static const step_t silence_steps[] = {{PDCP_CH_ENABLED, false, true}};
+static const step_t direction_steps[] = {{PDCP_CH_TRANSFER_TYPE, true, false}};
+static const step_t input_steps[] = {
+    {PDCP_CH_TYPE_PROFILE, true, false},      {PDCP_IN_SOURCE_VID_PID, false, false},
+    {PDCP_IN_SOURCE_SERIAL, false, false},    {PDCP_IN_SOURCE_TYPE, false, false},
+    {PDCP_CH_REQUIRED, false, false},         {PDCP_CH_DESIRED, false, false},
+    {PDCP_IN_TERMINAL_PROFILE, false, false},
+};
+static const step_t output_steps[] = {
+    {PDCP_CH_TYPE_PROFILE, true, false},
+    {PDCP_CH_REQUIRED, false, false},
+    {PDCP_CH_DESIRED, false, false},
+    {PDCP_OUT_NODE_ID, true, true},
+};
+
+#define STEPS(array) ((steps_t){array, (uint8_t)(sizeof array / sizeof array[0])})
+
+/* Longest values that a setup has use for: a bit string of 256 channels. */
+#define SETUP_VALUE_MAX 32u
+
+static pdcp_channel_t *current_channel(pdcp_bus_t *bus, uint8_t node)
+{
+    return &bus->nodes.channels[bus->nodes.nodes[node].setup_channel];
+}
+
+static steps_t steps_of(pdcp_bus_t *bus, uint8_t node)
+{
+    switch ((pass_t)bus->nodes.nodes[node].setup_pass) {
+    case PASS_DEVICE:
+        return STEPS(device_steps);
+    case PASS_SILENCE:
+        return STEPS(silence_steps);
+    case PASS_DIRECTION:
+        return STEPS(direction_steps);
+    default:
+        return current_channel(bus, node)->transfer == PDCP_INPUT ? STEPS(input_steps) : STEPS(output_steps);
+    }
+}
+
+static void fail(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    device->setup_attempts++;
+    if (device->setup_attempts < PDCP_SETUP_ATTEMPTS) {
+        pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node), now_ms + PDCP_SETUP_PAUSE_MS);
+        return;
+    }
+    device->state = PDCP_NODE_FAILED;
+    pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
+    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_SETUP_FAILED, node, PDCP_NONE, PDCP_OK);
+}
+
+static void no_room(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+{
+    pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
+    fail(bus, now_ms, node);
+}
+
+/* Writes of the setup: transfer enabled 0, and the node id of an output. False: no node id is left. */
+static bool write_step(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, uint8_t param)
+{
+    pdcp_channel_t *channel = current_channel(bus, node);
+    uint8_t value = 0;
+    if (param == PDCP_OUT_NODE_ID) {
+        if (channel->node_id == 0) {
+            pdcp_nodes_set_output_id(&bus->nodes, bus->nodes.nodes[node].setup_channel,
+                                     pdcp_bind_output_id(bind, bus, now_ms));
+        }
+        value = channel->node_id;
+        if (value == 0) {
+            return false;
+        }
+    }
+    pdcp_request_set(bus, now_ms, node, PDCP_CLIENT_SETUP, channel->index, param, &value, 1);
+    return true;
+}
+
+void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    device->setup_due = false;
+    const step_t *step = &steps_of(bus, node).steps[device->setup_step];
+    if (step->write) {
+        if (!write_step(bind, bus, now_ms, node, step->param)) {
+            no_room(bus, now_ms, node);
+        }
+        return;
+    }
+    const uint8_t index = device->setup_pass == PASS_DEVICE ? 0 : current_channel(bus, node)->index;
+    pdcp_request_get(bus, now_ms, node, PDCP_CLIENT_SETUP, index, step->param, SETUP_VALUE_MAX);
+}
+
+void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
+{
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    device->state = PDCP_NODE_SETUP;
+    device->setup_pass = PASS_DEVICE;
+    device->setup_step = 0;
+    device->setup_channel = PDCP_NONE;
+    device->setup_due = true;
+    device->ack_ms = PDCP_ACK_MS;
+    device->beacon_ms = PDCP_BEACON_MS;
+}
+
+static void enter_pass(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pass_t pass)
+{
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    if (device->first_channel == PDCP_NONE || pass > PASS_CHANNELS) {
+        device->state = PDCP_NODE_READY;
+        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_READY, node, PDCP_NONE, PDCP_OK);
+        return;
+    }
+    if (pass == PASS_CHANNELS && !pdcp_nodes_make_needs(&bus->nodes, node)) {
+        no_room(bus, now_ms, node);
+        return;
+    }
+    device->setup_pass = (uint8_t)pass;
+    device->setup_channel = device->first_channel;
+    device->setup_due = true;
+}
+
+/* The next step of this channel, the next channel, the next pass. */
+static void go_on(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+{
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    device->setup_step++;
+    device->setup_due = true;
+    if (device->setup_step < steps_of(bus, node).count) {
+        return;
+    }
+    device->setup_step = 0;
+    if (device->setup_pass != PASS_DEVICE) {
+        device->setup_channel = current_channel(bus, node)->next;
+        if (device->setup_channel != PDCP_NONE) {
+            return;
+        }
+    }
+    device->setup_due = false;
+    enter_pass(bus, now_ms, node, (pass_t)(device->setup_pass + 1));
+}
+
+static uint16_t clamp(uint16_t value, uint16_t low, uint16_t high)
+{
+    if (value < low) {
+        return low;
+    }
+    return value > high ? high : value;
+}
+
+/* Takes over a device parameter. False: it does not fit, the attempt has failed. */
+static bool take_device(pdcp_bus_t *bus, uint8_t node, uint8_t param, const uint8_t *value, uint8_t len)
+{
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    const uint16_t low = pdcp_value_u16(value, len, 0);
+    const uint16_t high = pdcp_value_u16(value, len, 2);
+    switch (param) {
+    case PDCP_DEV_VID_PID:
+        return low == device->identity.vid && high == device->identity.pid;
+    case PDCP_DEV_SERIAL:
+        return low == device->identity.sn;
+    case PDCP_DEV_TYPE_PROFILE:
+        device->type = low;
+        device->profile = high;
+        return true;
+    case PDCP_DEV_ACK_TIME:
+        device->ack_ms = clamp(low, PDCP_ACK_MIN_MS, PDCP_ACK_MAX_MS);
+        return true;
+    case PDCP_DEV_BEACON_INTERVAL:
+        device->beacon_ms = clamp(low, PDCP_BEACON_MIN_MS, PDCP_BEACON_MAX_MS);
+        return true;
+    default: /* PDCP_DEV_CHANNELS */
+        if (!pdcp_nodes_set_channels(&bus->nodes, node, pdcp_value_u8(value, len, 0))) {
+            pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
+            return false;
+        }
+        return true;
+    }
+}
+
+/* Forgets what was known of a channel whose direction has changed. */
+static void set_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
+{
+    pdcp_channel_t *channel = &bus->nodes.channels[number];
+    if (channel->transfer != transfer) {
+        pdcp_nodes_set_output_id(&bus->nodes, number, 0);
+        channel->link = PDCP_LINK_NONE;
+        channel->todo = PDCP_TODO_NONE;
+        channel->feed = PDCP_NONE;
+        channel->transfer = transfer;
+    }
+}
+
+/* An input's own idea of its source counts only while the arbitrator knows of no link. */
+static void take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len)
+{
+    const uint16_t low = pdcp_value_u16(value, len, 0);
+    const uint16_t high = pdcp_value_u16(value, len, 2);
+    if (input->link != PDCP_LINK_NONE) {
+        return;
+    }
+    if (param == PDCP_IN_SOURCE_VID_PID) {
+        input->source.vid = low;
+        input->source.pid = high;
+    } else if (param == PDCP_IN_SOURCE_SERIAL) {
+        input->source.sn = low;
+        input->source_index = pdcp_value_u8(value, len, 2);
+    } else {
+        input->source_type = low;
+        input->source_profile = high;
+    }
+}
+
+/* Takes over a channel parameter; bit strings come in pieces. False: the attempt has failed. */
+static bool take_channel(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
+{
+    const uint8_t number = bus->nodes.nodes[node].setup_channel;
+    pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const uint8_t len = (uint8_t)reply->len;
+    switch (reply->param) {
+    case PDCP_CH_TYPE_PROFILE:
+        channel->type = pdcp_value_u16(reply->bytes, len, 0);
+        channel->profile = pdcp_value_u16(reply->bytes, len, 2);
+        return true;
+    case PDCP_CH_TRANSFER_TYPE: {
+        const uint8_t transfer = pdcp_value_u8(reply->bytes, len, 0);
+        if (transfer != PDCP_INPUT && transfer != PDCP_OUTPUT) {
+            return false;
+        }
+        set_direction(bus, number, transfer);
+        return true;
+    }
+    case PDCP_CH_REQUIRED:
+    case PDCP_CH_DESIRED:
+        pdcp_nodes_put_needs(&bus->nodes, number, reply->param == PDCP_CH_DESIRED, reply->offset,
+                             reply->bytes, reply->len);
+        return true;
+    case PDCP_IN_TERMINAL_PROFILE:
+        channel->terminal_profile = pdcp_value_u16(reply->bytes, len, 0);
+        return true;
+    default:
+        take_source(channel, reply->param, reply->bytes, len);
+        return true;
+    }
+}
+
+/* Takes over a value or a piece of one. Numbers stand in the first piece; bit strings may have more. */
+static bool take(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
+{
+    const bool is_device = bus->nodes.nodes[node].setup_pass == PASS_DEVICE;
+    const bool is_bits = !is_device && (reply->param == PDCP_CH_REQUIRED || reply->param == PDCP_CH_DESIRED);
+    if (reply->offset != 0 && !is_bits) {
+        return true;
+    }
+    if (reply->code == PDCP_SET_PARAMETER) {
+        if (reply->param == PDCP_CH_ENABLED) {
+            current_channel(bus, node)->enabled = false;
+        }
+        return true;
+    }
+    if (is_device) {
+        return take_device(bus, node, reply->param, reply->bytes, (uint8_t)reply->len);
+    }
+    return take_channel(bus, node, reply);
+}
+
+void pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+{
+    static const uint8_t nothing[1] = {0};
+    const pdcp_node_t *device = &bus->nodes.nodes[node];
+    const bool mandatory = steps_of(bus, node).steps[device->setup_step].mandatory;
+    pdcp_reply_t part = *reply;
+    if (part.bytes == NULL) {
+        part.bytes = nothing;
+    }
+    const bool has_value = !reply->done || reply->status == PDCP_OK;
+    if (has_value && !take(bus, node, &part)) {
+        pdcp_request_cancel(bus, node);
+        fail(bus, now_ms, node);
+        return;
+    }
+    if (!reply->done) {
+        return;
+    }
+    if (reply->status == PDCP_ERR_NO_ANSWER || (reply->status != PDCP_OK && mandatory)) {
+        fail(bus, now_ms, node);
+        return;
+    }
+    go_on(bus, now_ms, node);
+}

@@ -1,0 +1,26 @@
+/* Setup of a bound device (pdcp-bus.md 6): read what it is, silence its channels, read what they are, give
+ * its outputs node ids.
+ *
+ * Four passes: the device's own parameters; transfer enabled 0 to every channel; the direction of every
+ * channel; everything else of every channel. Each device is on its own way, so that none holds up another. A
+ * step that fails ends the attempt; after a pause the setup starts again, and after PDCP_SETUP_ATTEMPTS
+ * attempts the device is left bound but unlinked (D-BUS-17). */
+#ifndef PDCP_SETUP_H
+#define PDCP_SETUP_H
+
+#include "pdcp_bind.h"
+#include "pdcp_bus.h"
+
+/* Puts a device at the beginning of its setup, in whatever state it is; its place must have no request under
+ * way. */
+void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node);
+
+/* Sends the request of the current step. To be called when the device's setup_due is set and it has no
+ * request under way. */
+void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node);
+
+/* A reply to a request of PDCP_CLIENT_SETUP. When an attempt has failed, the timer of the device's requests
+ * runs until the next one is to be started. */
+void pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply);
+
+#endif

@@ -1,0 +1,107 @@
+/* Numbers of the protocol, each with its source. [PDCP] is the bus protocol, [PROFILE] the thesis on the
+ * profile layer, D-BUS-n a decision of docs/decisions.md. */
+#ifndef PDCP_SPEC_H
+#define PDCP_SPEC_H
+
+#include <stdint.h>
+
+/* Message priority: bits 10 and 9 of the identifier [PDCP 2.2.1]. Common practice: high for data and beacons,
+ * normal for everything else [PROFILE 2.2]. */
+enum { PDCP_PRIORITY_HIGH = 0, PDCP_PRIORITY_NORMAL = 1, PDCP_PRIORITY_LOW = 2, PDCP_PRIORITY_BINDING = 3 };
+
+/* Node ids [PDCP 2.2.3]; 255 is never given out (D-BUS-2). */
+enum { PDCP_NODE_BROADCAST = 0, PDCP_NODE_MIN = 1, PDCP_NODE_MAX = 254, PDCP_NODE_REFUSED = 0 };
+
+/* Function codes [PDCP 3.1]. An answer's code is its request's code plus 80h. */
+enum {
+    PDCP_BIND_DEVICE = 0x01,
+    PDCP_GET_DEVICE_INFO = 0x02, /* deprecated, as are 05 to 07 (D-BUS-4) */
+    PDCP_GET_PARAMETER = 0x03,
+    PDCP_SET_PARAMETER = 0x04,
+    PDCP_IND_GET_PARAMETER = 0x05,
+    PDCP_IND_SET_PARAMETER = 0x06,
+    PDCP_SET_NODE_ID = 0x07,
+    PDCP_SUSPEND = 0x08,
+    PDCP_RELEASE = 0x09,
+    PDCP_BEACON = 0x0A,
+    PDCP_RESET = 0x0B,
+    PDCP_BULK_GET = 0x0C,
+    PDCP_BULK_SET = 0x0D,
+    PDCP_BULK_DATA = 0x0E,
+    PDCP_UPDATE_CHANNEL = 0x0F,
+    PDCP_ANSWER = 0x80 /* added to a request's code */
+};
+
+/* Response codes [PDCP 3.2.2]. */
+enum { PDCP_FAILURE = 0, PDCP_SUCCESS = 1, PDCP_USE_BULK = 2 };
+
+/* Device parameters, channel index 0 [PROFILE table 2.8]. */
+enum {
+    PDCP_DEV_VID_PID = 1,
+    PDCP_DEV_SERIAL = 2,
+    PDCP_DEV_EAN13L = 3,
+    PDCP_DEV_EAN13H = 4,
+    PDCP_DEV_VERSIONS = 5,
+    PDCP_DEV_TYPE_PROFILE = 6,
+    PDCP_DEV_DESCRIPTOR = 7,
+    PDCP_DEV_NODE_ID = 8,
+    PDCP_DEV_CHANNELS = 9,
+    PDCP_DEV_BEACON_INTERVAL = 10,
+    PDCP_DEV_ACK_TIME = 11,
+    PDCP_DEV_BIND_TIMEOUT = 12
+};
+
+/* Channel parameters, channel index 1 to n [PROFILE tables 2.9 and 2.10, 4.2.4]. */
+enum {
+    PDCP_CH_TYPE_PROFILE = 1,
+    PDCP_CH_DESCRIPTOR = 2,
+    PDCP_CH_TRANSFER_TYPE = 3,
+    PDCP_CH_ENABLED = 4,
+    PDCP_OUT_NODE_ID = 5,
+    PDCP_IN_SOURCE_VID_PID = 5,
+    PDCP_IN_SOURCE_SERIAL = 6, /* serial number, channel index */
+    PDCP_IN_SOURCE_NODES = 7,  /* device id, output channel id */
+    PDCP_IN_SOURCE_TYPE = 8,   /* type, profile */
+    PDCP_CH_REQUIRED = 9,
+    PDCP_CH_DESIRED = 10,
+    PDCP_IN_TERMINAL_PROFILE = 11
+};
+
+/* Transfer type, parameter 3 of a channel. */
+enum { PDCP_INPUT = 1, PDCP_OUTPUT = 2 };
+
+/* Source of an unconnected input (D-BUS-7). */
+enum { PDCP_NO_SOURCE_INDEX = 0xFF };
+#define PDCP_NO_SOURCE_WORD 0xFFFFu
+
+/* Packets of a bulk transfer [PDCP 3.2.10], ids wrap (D-BUS-9). */
+enum { PDCP_BULK_PACKET_MAX = 6, PDCP_VALUE_MAX = 4, PDCP_BULK_RESTARTS = 3 };
+
+/* Times in ms. */
+enum {
+    PDCP_BIND_TIMEOUT_MS = 1000,    /* a suggested id is reserved so long (D-BUS-6) */
+    PDCP_ACK_MS = 100,              /* acknowledgement time when the device names none */
+    PDCP_ACK_MIN_MS = 20,           /* D-BUS-13 */
+    PDCP_ACK_MAX_MS = 500,          /* D-BUS-13 */
+    PDCP_TRIES = 3,                 /* a request and two repetitions */
+    PDCP_BEACON_MS = 500,           /* both ways (D-BUS-11, D-BUS-13) */
+    PDCP_BEACON_MIN_MS = 50,        /* D-BUS-13 */
+    PDCP_BEACON_MAX_MS = 10000,     /* D-BUS-13 */
+    PDCP_BEACONS_MISSED = 3,        /* intervals of silence until a device is lost */
+    PDCP_LOST_KEPT_MS = 10000,      /* ids of a lost device are kept for it */
+    PDCP_DEVICE_BIND_MAX_MS = 8000, /* device role: longest pause between requests (D-BUS-16) */
+    PDCP_DEVICE_SILENCE_MS = 3000,  /* device role: arbitrator gone (D-BUS-16) */
+    PDCP_SETUP_PAUSE_MS = 250,      /* between two attempts to set a device up (D-BUS-17) */
+    PDCP_SETUP_ATTEMPTS = 3,        /* D-BUS-17 */
+    PDCP_STRANGER_QUIET_MS = 1200,  /* no Reset to strangers so soon after our start (D-BUS-15) */
+    PDCP_STRANGER_PAUSE_MS = 1000   /* between two Resets to the same id (D-BUS-15) */
+};
+
+/* VID, PID and serial number: who a device is [PDCP 3.2.1]. */
+typedef struct {
+    uint16_t vid;
+    uint16_t pid;
+    uint16_t sn;
+} pdcp_identity_t;
+
+#endif

@@ -1,0 +1,97 @@
+#include "pdcp_timer.h"
+
+#include <string.h>
+
+#include "pdcp_time.h"
+
+void pdcp_timers_init(pdcp_timers_t *timers)
+{
+    memset(timers, 0, sizeof *timers);
+}
+
+static bool earlier(const pdcp_timers_t *timers, uint8_t a, uint8_t b)
+{
+    return pdcp_time_before(timers->deadline_ms[a], timers->deadline_ms[b]);
+}
+
+static void put(pdcp_timers_t *timers, uint8_t at, uint8_t timer)
+{
+    timers->heap[at] = timer;
+    timers->place[timer] = (uint8_t)(at + 1);
+}
+
+static void rise(pdcp_timers_t *timers, uint8_t at, uint8_t timer)
+{
+    while (at > 0) {
+        const uint8_t parent = (uint8_t)((at - 1) / 2);
+        if (!earlier(timers, timer, timers->heap[parent])) {
+            break;
+        }
+        put(timers, at, timers->heap[parent]);
+        at = parent;
+    }
+    put(timers, at, timer);
+}
+
+static void sink(pdcp_timers_t *timers, uint8_t at, uint8_t timer)
+{
+    for (;;) {
+        uint16_t child = (uint16_t)(2u * at + 1u);
+        if (child >= timers->count) {
+            break;
+        }
+        if (child + 1u < timers->count && earlier(timers, timers->heap[child + 1u], timers->heap[child])) {
+            child++;
+        }
+        if (!earlier(timers, timers->heap[child], timer)) {
+            break;
+        }
+        put(timers, at, timers->heap[child]);
+        at = (uint8_t)child;
+    }
+    put(timers, at, timer);
+}
+
+void pdcp_timers_set(pdcp_timers_t *timers, uint8_t timer, uint32_t deadline_ms)
+{
+    pdcp_timers_cancel(timers, timer);
+    timers->deadline_ms[timer] = deadline_ms;
+    timers->count++;
+    rise(timers, (uint8_t)(timers->count - 1), timer);
+}
+
+void pdcp_timers_cancel(pdcp_timers_t *timers, uint8_t timer)
+{
+    if (timers->place[timer] == 0) {
+        return;
+    }
+    const uint8_t at = (uint8_t)(timers->place[timer] - 1);
+    timers->place[timer] = 0;
+    timers->count--;
+    if (at == timers->count) {
+        return;
+    }
+    const uint8_t last = timers->heap[timers->count];
+    rise(timers, at, last);
+    sink(timers, (uint8_t)(timers->place[last] - 1), last);
+}
+
+bool pdcp_timers_is_set(const pdcp_timers_t *timers, uint8_t timer)
+{
+    return timers->place[timer] != 0;
+}
+
+bool pdcp_timers_take_due(pdcp_timers_t *timers, uint32_t now_ms, uint8_t *timer)
+{
+    if (timers->count == 0 || pdcp_time_before(now_ms, timers->deadline_ms[timers->heap[0]])) {
+        return false;
+    }
+    *timer = timers->heap[0];
+    pdcp_timers_cancel(timers, *timer);
+    return true;
+}
+
+uint32_t pdcp_timers_next_ms(const pdcp_timers_t *timers, uint32_t now_ms)
+{
+    return timers->count != 0 ? timers->deadline_ms[timers->heap[0]] : now_ms + PDCP_TIME_FAR_MS;
+}

@@ -1,0 +1,40 @@
+/* Deadlines in a binary heap: the earliest is known at once, and setting or cancelling one costs a walk of at
+ * most log2(PDCP_TIMERS_MAX) levels, never a scan of all devices. */
+#ifndef PDCP_TIMER_H
+#define PDCP_TIMER_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_limits.h"
+
+/* Two for each device and the arbitrator's own. */
+enum {
+    PDCP_TIMER_REQUEST = 0,             /* + slot: acknowledgement time, pause between attempts */
+    PDCP_TIMER_LIFE = PDCP_DEVICES_MAX, /* + slot: silence of a device, keeping of a lost one */
+    PDCP_TIMER_BEACON = 2 * PDCP_DEVICES_MAX,
+    PDCP_TIMERS_MAX
+};
+
+typedef struct {
+    uint32_t deadline_ms[PDCP_TIMERS_MAX];
+    uint8_t heap[PDCP_TIMERS_MAX];  /* timer numbers; earliest first */
+    uint8_t place[PDCP_TIMERS_MAX]; /* where a timer stands in heap, plus 1; 0: not set */
+    uint8_t count;
+} pdcp_timers_t;
+
+void pdcp_timers_init(pdcp_timers_t *timers);
+
+/* Sets timer to deadline_ms, replacing what it was set to. */
+void pdcp_timers_set(pdcp_timers_t *timers, uint8_t timer, uint32_t deadline_ms);
+void pdcp_timers_cancel(pdcp_timers_t *timers, uint8_t timer);
+
+bool pdcp_timers_is_set(const pdcp_timers_t *timers, uint8_t timer);
+
+/* Takes the earliest timer out if its deadline is reached. False: none is due. */
+bool pdcp_timers_take_due(pdcp_timers_t *timers, uint32_t now_ms, uint8_t *timer);
+
+/* The earliest deadline; now_ms + PDCP_TIME_FAR_MS when none is set. */
+uint32_t pdcp_timers_next_ms(const pdcp_timers_t *timers, uint32_t now_ms);
+
+#endif

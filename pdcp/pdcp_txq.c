@@ -1,0 +1,36 @@
+#include "pdcp_txq.h"
+
+#include <stddef.h>
+#include <string.h>
+
+void pdcp_txq_init(pdcp_txq_t *txq)
+{
+    memset(txq, 0, sizeof *txq);
+}
+
+bool pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame)
+{
+    if (txq->count == PDCP_TX_MAX) {
+        return false;
+    }
+    uint8_t at = txq->count;
+    while (at > 0 && txq->frames[at - 1].id <= frame->id) {
+        txq->frames[at] = txq->frames[at - 1];
+        at--;
+    }
+    txq->frames[at] = *frame;
+    txq->count++;
+    return true;
+}
+
+const can_frame_t *pdcp_txq_peek(const pdcp_txq_t *txq)
+{
+    return txq->count != 0 ? &txq->frames[txq->count - 1] : NULL;
+}
+
+void pdcp_txq_pop(pdcp_txq_t *txq)
+{
+    if (txq->count != 0) {
+        txq->count--;
+    }
+}

@@ -44,17 +44,9 @@ void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte)
     drop_taken(rx);
     rx->bytes[rx->len++] = byte;
     rx->last_ms = now_ms;
+    rx->overdue = false;
     if (rx->len <= 2) {
         hunt(rx, 0);
-    }
-}
-
-void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms)
-{
-    drop_taken(rx);
-    if (rx->len != 0 && pdcp_time_reached(now_ms, rx->last_ms + ARB_HOSTRX_TIMEOUT_MS)) {
-        rx->given_up++;
-        hunt(rx, 1);
     }
 }
 
@@ -69,17 +61,26 @@ static bool checksums_match(const arb_hostrx_t *rx, const arb_host_header_t *hea
                                     arb_host_crc16(&rx->bytes[ARB_HOST_HEADER], payload);
 }
 
-/* Does the message at the front, of total bytes, have a header with a right checksum inside? The rest of that
- * one may still be on its way. */
-static bool holds_header(const arb_hostrx_t *rx, uint16_t total)
+typedef enum { INSIDE_NOTHING, INSIDE_HEADER, INSIDE_DOUBTFUL } inside_t;
+
+/* Does another message begin inside the one at the front, of total bytes: a header with a right checksum,
+ * whose end may stand behind total? Doubtful: there is the beginning of one, and it is not all here yet. */
+static inside_t look_inside(const arb_hostrx_t *rx, uint16_t total)
 {
-    for (uint16_t at = 1; at + ARB_HOST_HEADER <= total; at++) {
+    for (uint16_t at = 1; at < total; at++) {
         const uint8_t *bytes = &rx->bytes[at];
-        if (bytes[0] == ARB_HOST_SYNC1 && bytes[1] == ARB_HOST_SYNC2 && bytes[5] == arb_host_crc8(bytes)) {
-            return true;
+        const uint16_t left = (uint16_t)(rx->len - at);
+        if (bytes[0] != ARB_HOST_SYNC1 || (left > 1 && bytes[1] != ARB_HOST_SYNC2)) {
+            continue;
+        }
+        if (left < ARB_HOST_HEADER) {
+            return INSIDE_DOUBTFUL;
+        }
+        if (bytes[5] == arb_host_crc8(bytes)) {
+            return INSIDE_HEADER;
         }
     }
-    return false;
+    return INSIDE_NOTHING;
 }
 
 static bool size_is_possible(uint16_t size)
@@ -98,6 +99,29 @@ static bool give_up_size(arb_hostrx_t *rx, const arb_host_header_t *header, arb_
     request->too_long = too_long;
     request->crc_ok = true;
     return too_long;
+}
+
+static bool front_is_complete(const arb_hostrx_t *rx)
+{
+    arb_host_header_t header;
+    if (rx->len < ARB_HOST_HEADER) {
+        return false;
+    }
+    arb_host_decode_header(rx->bytes, &header);
+    return size_is_possible(header.size) && rx->len - ARB_HOST_HEADER >= header.size;
+}
+
+void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms)
+{
+    drop_taken(rx);
+    if (rx->len == 0 || !pdcp_time_reached(now_ms, rx->last_ms + ARB_HOSTRX_TIMEOUT_MS)) {
+        return;
+    }
+    rx->overdue = true;
+    if (!front_is_complete(rx)) {
+        rx->given_up++;
+        hunt(rx, 1);
+    }
 }
 
 bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
@@ -121,8 +145,12 @@ bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
         }
         request->crc_ok = checksums_match(rx, &header);
         if (!request->crc_ok) {
+            const inside_t inside = look_inside(rx, total);
+            if (inside == INSIDE_DOUBTFUL && !rx->overdue) {
+                return false;
+            }
             rx->bad_crcs++;
-            if (holds_header(rx, total)) {
+            if (inside == INSIDE_HEADER) {
                 hunt(rx, 1);
                 continue;
             }

@@ -17,8 +17,9 @@
 #define ARB_HOSTRX_TIMEOUT_MS 100
 
 typedef struct {
-    uint8_t bytes[ARB_HOST_HEADER + ARB_HOST_REQUEST_MAX + ARB_HOST_CRC];
+    uint8_t bytes[2 * ARB_HOST_HEADER + ARB_HOST_REQUEST_MAX + ARB_HOST_CRC];
     uint16_t len;
+    bool overdue;       /* 100 ms without a byte: what is doubtful is decided now */
     uint16_t taken;     /* bytes of the request handed out last; they go with the next call */
     uint32_t last_ms;   /* of the last byte */
     uint32_t garbage;   /* bytes skipped, since the start */

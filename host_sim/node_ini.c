@@ -1,6 +1,5 @@
 #include "node_ini.h"
 
-#include <ctype.h>
 #include <errno.h>
 #include <ini.h>
 #include <stdarg.h>
@@ -8,6 +7,8 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+
+#include "node_text.h"
 
 enum { LINE_MAX_CHARS = 198, BULK_MIN = 16, PARAMETER_LONGEST = 4096 };
 
@@ -67,24 +68,10 @@ static bool out_of_memory(reader_t *reader)
 
 /* --- values --- */
 
-/* Decimal, or hexadecimal with 0x. A leading zero is no octal. */
-static bool parse_number(const char *text, long long *number)
-{
-    const char *digits = text[0] == '-' ? &text[1] : text;
-    const bool hex = digits[0] == '0' && (digits[1] == 'x' || digits[1] == 'X');
-    char *end = NULL;
-    if (!isdigit((unsigned char)digits[0])) {
-        return false;
-    }
-    errno = 0;
-    *number = strtoll(text, &end, hex ? 16 : 10);
-    return errno == 0 && end != text && *end == '\0';
-}
-
 static bool take_number(reader_t *reader, const char *key, const char *text, long long min, long long max,
                         long long *number)
 {
-    if (!parse_number(text, number)) {
+    if (!node_text_number(text, number)) {
         return fail(reader, reader->line, "%s: '%s' is not a number", key, text);
     }
     if (*number < min || *number > max) {
@@ -119,17 +106,6 @@ static bool take_text(reader_t *reader, const char *text, char **copy)
     free(*copy);
     *copy = strdup(text);
     return *copy != NULL || out_of_memory(reader);
-}
-
-/* A file named in the description lies relative to it. */
-static char *path_beside(const char *beside, const char *path)
-{
-    const char *slash = strrchr(beside, '/');
-    char *joined = NULL;
-    if (path[0] == '/' || slash == NULL) {
-        return strdup(path);
-    }
-    return asprintf(&joined, "%.*s%s", (int)(slash - beside + 1), beside, path) >= 0 ? joined : NULL;
 }
 
 /* --- [device] --- */
@@ -225,7 +201,7 @@ static bool key_state(reader_t *reader, const char *key, const char *text)
         return fail(reader, reader->line, "%s: no file is named", key);
     }
     free(reader->ini->state_path);
-    reader->ini->state_path = path_beside(reader->path, text);
+    reader->ini->state_path = node_text_path(reader->path, text);
     return reader->ini->state_path != NULL || out_of_memory(reader);
 }
 
@@ -443,7 +419,7 @@ static bool keep_value(reader_t *reader, const char *text, size_t capacity)
     if (bytes == NULL) {
         return out_of_memory(reader);
     }
-    memcpy(bytes, text, len);
+    memcpy(bytes, text, len + 1);
     free(extra->bytes);
     extra->bytes = bytes;
     reader->ini->extra_lens[reader->index] = (uint16_t)len;
@@ -523,7 +499,7 @@ static bool begin_device(reader_t *reader)
 static bool begin_channel(reader_t *reader, const char *number)
 {
     long long index;
-    if (!parse_number(number, &index) || index < 1 || index > PDCP_DEVICE_CHANNELS_MAX) {
+    if (!node_text_number(number, &index) || index < 1 || index > PDCP_DEVICE_CHANNELS_MAX) {
         return fail(reader, reader->line, "[channel %s]: the index is a number from 1 to %d", number,
                     PDCP_DEVICE_CHANNELS_MAX);
     }
@@ -547,8 +523,8 @@ static bool begin_parameter(reader_t *reader, char *numbers)
     if (channel_text != NULL) {
         *channel_text++ = '\0';
     }
-    if (!parse_number(numbers, &param) || param < 0 || param > 255 || channel_text == NULL ||
-        !parse_number(channel_text, &channel) || channel < 0 || channel > 255) {
+    if (!node_text_number(numbers, &param) || param < 0 || param > 255 || channel_text == NULL ||
+        !node_text_number(channel_text, &channel) || channel < 0 || channel > 255) {
         return fail(reader, reader->line, "[parameter ID CHANNEL]: both are numbers from 0 to 255");
     }
     if (reader->ini->desc.extra_count == NODE_INI_EXTRAS_MAX) {
@@ -628,189 +604,31 @@ static int on_key(void *ctx, const char *section, const char *name, const char *
     return fail(reader, reader->line, "unknown key '%s'", name);
 }
 
-/* --- signals --- */
+/* --- the whole --- */
 
-/* Splits text at blanks into at most max parts. Returns how many there are, more than max meaning too many.
- */
-static size_t split(char *text, char *parts[], size_t max)
+static bool is_input(const reader_t *reader, long long channel)
 {
-    size_t count = 0;
-    for (char *part = NULL; (part = strsep(&text, " \t")) != NULL;) {
-        if (part[0] != '\0' && count < max) {
-            parts[count] = part;
-        }
-        count += part[0] != '\0' ? 1u : 0u;
-    }
-    return count;
+    return channel >= 1 && channel <= (long long)reader->channel_last &&
+           reader->ini->channels[channel - 1].direction == PDCP_INPUT;
 }
-
-static bool in_range(const profile_type_t *type, long long number)
-{
-    int32_t min = 0;
-    int32_t max = 0;
-    return profile_type_range(type, &min, &max) && number >= min && number <= max;
-}
-
-static bool take_level(reader_t *reader, unsigned index, const char *text, int32_t *level)
-{
-    const int line = reader->drafts[index].signal_line;
-    long long number;
-    if (!parse_number(text, &number)) {
-        return fail(reader, line, "signal: '%s' is not a number", text);
-    }
-    if (!in_range(&reader->ini->types[index], number)) {
-        return fail(reader, line, "signal: %s does not fit the channel's type", text);
-    }
-    *level = (int32_t)number;
-    return true;
-}
-
-static bool signal_constant(reader_t *reader, unsigned index, char *parts[])
-{
-    return take_level(reader, index, parts[1], &reader->ini->signals[index].min);
-}
-
-/* sine and square. */
-static bool signal_wave(reader_t *reader, unsigned index, char *parts[])
-{
-    node_signal_t *signal = &reader->ini->signals[index];
-    const int line = reader->drafts[index].signal_line;
-    long long period;
-    if (!take_level(reader, index, parts[1], &signal->min) ||
-        !take_level(reader, index, parts[2], &signal->max)) {
-        return false;
-    }
-    if (signal->min > signal->max) {
-        return fail(reader, line, "signal: %s is more than %s", parts[1], parts[2]);
-    }
-    if (!parse_number(parts[3], &period) || period < 2 || period > 3600000) {
-        return fail(reader, line, "signal: the period is a number from 2 to 3600000 ms");
-    }
-    signal->period_ms = (uint32_t)period;
-    return true;
-}
-
-static bool signal_copy(reader_t *reader, unsigned index, char *parts[])
-{
-    node_signal_t *signal = &reader->ini->signals[index];
-    const int line = reader->drafts[index].signal_line;
-    long long source;
-    if (!parse_number(parts[1], &source) || source < 1 || source > (long long)reader->channel_last ||
-        reader->ini->channels[source - 1].direction != PDCP_INPUT) {
-        return fail(reader, line, "signal: %s is not an input of this device", parts[1]);
-    }
-    signal->source = (uint8_t)source;
-    return true;
-}
-
-/* One line of a replay: time_ms,value. Empty lines and those that begin with # are skipped. */
-static bool take_point(reader_t *reader, unsigned index, const char *path, unsigned line, char *text)
-{
-    node_signal_t *signal = &reader->ini->signals[index];
-    const int at = reader->drafts[index].signal_line;
-    long long time_ms;
-    long long value;
-    text[strcspn(text, "\r\n")] = '\0';
-    if (text[0] == '\0' || text[0] == '#') {
-        return true;
-    }
-    char *comma = strchr(text, ',');
-    if (comma != NULL) {
-        *comma++ = '\0';
-        comma += strspn(comma, " \t");
-    }
-    if (comma == NULL || !parse_number(text, &time_ms) || !parse_number(comma, &value)) {
-        return fail(reader, at, "%s:%u: not of the form time_ms,value", path, line);
-    }
-    if (!in_range(&reader->ini->types[index], value)) {
-        return fail(reader, at, "%s:%u: %s does not fit the channel's type", path, line, comma);
-    }
-    const bool first = signal->point_count == 0;
-    if (first ? time_ms != 0
-              : time_ms <= signal->points[signal->point_count - 1].time_ms || time_ms > 86400000) {
-        return fail(reader, at, "%s:%u: times begin with 0 and rise, to one day at most", path, line);
-    }
-    node_signal_point_t *points = realloc(signal->points, (signal->point_count + 1) * sizeof *points);
-    if (points == NULL) {
-        return out_of_memory(reader);
-    }
-    points[signal->point_count].time_ms = (uint32_t)time_ms;
-    points[signal->point_count].value = (int32_t)value;
-    signal->points = points;
-    signal->point_count++;
-    return true;
-}
-
-static bool take_points(reader_t *reader, unsigned index, const char *path)
-{
-    node_signal_t *signal = &reader->ini->signals[index];
-    const int at = reader->drafts[index].signal_line;
-    char text[128];
-    FILE *file = fopen(path, "re");
-    if (file == NULL) {
-        return fail(reader, at, "%s: %s", path, strerror(errno));
-    }
-    bool good = true;
-    for (unsigned line = 1; good && fgets(text, sizeof text, file) != NULL; line++) {
-        good = take_point(reader, index, path, line, text);
-    }
-    (void)fclose(file);
-    if (good && signal->point_count == 0) {
-        return fail(reader, at, "%s: no values", path);
-    }
-    /* The last value holds as long as the one before it, then the first one follows. */
-    if (good && signal->point_count > 1) {
-        const node_signal_point_t *last = &signal->points[signal->point_count - 1];
-        signal->period_ms = last->time_ms + (last->time_ms - (last - 1)->time_ms);
-    }
-    return good;
-}
-
-static bool signal_csv(reader_t *reader, unsigned index, char *parts[])
-{
-    char *path = path_beside(reader->path, parts[1]);
-    const bool good = path != NULL ? take_points(reader, index, path) : out_of_memory(reader);
-    free(path);
-    return good;
-}
-
-static const struct {
-    const char *word;
-    node_signal_kind_t kind;
-    size_t parts; /* with the word itself */
-    const char *usage;
-    bool (*take)(reader_t *reader, unsigned index, char *parts[]);
-} signal_words[] = {
-    {"constant", NODE_SIGNAL_CONSTANT, 2, "constant VALUE", signal_constant},
-    {"sine", NODE_SIGNAL_SINE, 4, "sine MIN MAX PERIOD_MS", signal_wave},
-    {"square", NODE_SIGNAL_SQUARE, 4, "square MIN MAX PERIOD_MS", signal_wave},
-    {"csv", NODE_SIGNAL_CSV, 2, "csv FILE", signal_csv},
-    {"copy", NODE_SIGNAL_COPY, 2, "copy CHANNEL", signal_copy},
-};
 
 static bool take_signal(reader_t *reader, unsigned index)
 {
-    draft_t *draft = &reader->drafts[index];
+    const draft_t *draft = &reader->drafts[index];
     node_signal_t *signal = &reader->ini->signals[index];
-    char *parts[5] = {NULL};
-    const size_t count = split(draft->signal, parts, 4);
-    for (size_t i = 0; i < sizeof signal_words / sizeof signal_words[0]; i++) {
-        if (count == 0 || strcmp(parts[0], signal_words[i].word) != 0) {
-            continue;
-        }
-        if (count != signal_words[i].parts) {
-            return fail(reader, draft->signal_line, "signal: is written %s", signal_words[i].usage);
-        }
-        signal->kind = signal_words[i].kind;
-        if (!draft->has_rate && signal->kind != NODE_SIGNAL_COPY) {
-            signal->rate_ms = NODE_INI_RATE_MS;
-        }
-        return signal_words[i].take(reader, index, parts);
+    char error[256];
+    if (!node_signal_parse(signal, draft->signal, &reader->ini->types[index], reader->path, error,
+                           sizeof error)) {
+        return fail(reader, draft->signal_line, "signal: %s", error);
     }
-    return fail(reader, draft->signal_line, "signal: is constant, sine, square, csv or copy");
+    if (signal->kind == NODE_SIGNAL_COPY && !is_input(reader, signal->source)) {
+        return fail(reader, draft->signal_line, "signal: %d is not an input of this device", signal->source);
+    }
+    if (!draft->has_rate && signal->kind != NODE_SIGNAL_COPY) {
+        signal->rate_ms = NODE_INI_RATE_MS;
+    }
+    return true;
 }
-
-/* --- the whole --- */
 
 /* which: 0 required, 1 desired. */
 static bool take_needs(reader_t *reader, unsigned index, unsigned which)
@@ -826,8 +644,7 @@ static bool take_needs(reader_t *reader, unsigned index, unsigned which)
         if (part[0] == '\0') {
             continue;
         }
-        if (!parse_number(part, &number) || number < 1 || number > (long long)reader->channel_last ||
-            reader->ini->channels[number - 1].direction != PDCP_INPUT) {
+        if (!node_text_number(part, &number) || !is_input(reader, number)) {
             return fail(reader, line, "%s: %s is not an input of this device", key, part);
         }
         bits[number / 8] = (uint8_t)(bits[number / 8] | (0x80u >> (number % 8))); /* D-BUS-8 */
@@ -843,13 +660,16 @@ static bool check_input(reader_t *reader, unsigned index)
 {
     const draft_t *draft = &reader->drafts[index];
     const pdcp_device_channel_desc_t *channel = &reader->ini->channels[index];
+    int32_t min = 0;
+    int32_t max = 0;
     if (draft->signal != NULL || draft->has_rate) {
         return fail(reader, draft->line, "[channel %u]: an input has no signal and no rate_ms", index + 1);
     }
     if (draft->has_safe && !channel->terminal) {
         return fail(reader, draft->line, "[channel %u]: only a terminal input has a safe value", index + 1);
     }
-    if (!in_range(&reader->ini->types[index], channel->safe)) {
+    (void)profile_type_range(&reader->ini->types[index], &min, &max);
+    if (channel->safe < min || channel->safe > max) {
         return fail(reader, draft->line, "[channel %u]: the safe value does not fit the type", index + 1);
     }
     return true;
@@ -970,7 +790,7 @@ void node_ini_free(node_ini_t *ini)
         return;
     }
     for (unsigned i = 0; i < PDCP_DEVICE_CHANNELS_MAX; i++) {
-        free(ini->signals[i].points);
+        node_signal_clear(&ini->signals[i]);
         free(ini->texts[i + 1]);
     }
     for (unsigned i = 0; i < NODE_INI_EXTRAS_MAX; i++) {

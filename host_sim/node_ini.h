@@ -5,38 +5,12 @@
 #include <stddef.h>
 #include <stdint.h>
 
+#include "node_signal.h"
 #include "pdcp_device.h"
 #include "profile_type.h"
 
 #define NODE_INI_RATE_MS 100u /* rate_ms of an output that names none */
 #define NODE_INI_EXTRAS_MAX 8
-
-typedef enum {
-    NODE_SIGNAL_NONE = 0,
-    NODE_SIGNAL_CONSTANT,
-    NODE_SIGNAL_SINE,
-    NODE_SIGNAL_SQUARE,
-    NODE_SIGNAL_CSV,
-    NODE_SIGNAL_COPY /* of an input; when rate_ms is 0, whenever the input receives */
-} node_signal_kind_t;
-
-/* From time_ms of the replay on, the value is this. */
-typedef struct {
-    uint32_t time_ms;
-    int32_t value;
-} node_signal_point_t;
-
-/* What an output sends. Values lie within the range of the channel's type. */
-typedef struct {
-    node_signal_kind_t kind;
-    int32_t min; /* constant: the value */
-    int32_t max;
-    uint32_t period_ms; /* sine, square, csv: of one round; csv with one point: 0, it never changes */
-    node_signal_point_t *points; /* csv: by time, the first at 0; the description's own */
-    size_t point_count;
-    uint8_t source; /* copy: channel index of the input */
-    uint32_t rate_ms;
-} node_signal_t;
 
 typedef struct {
     pdcp_device_desc_t desc; /* points into this struct */

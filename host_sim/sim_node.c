@@ -1,7 +1,6 @@
 #include "sim_node.h"
 
 #include <inttypes.h>
-#include <math.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -30,53 +29,6 @@ static uint32_t ms_of(uint64_t time_us)
     return (uint32_t)(time_us / 1000u);
 }
 
-/* --- signals --- */
-
-static int32_t sine_value(const node_signal_t *signal, uint64_t time_ms)
-{
-    const double turn = (double)(time_ms % signal->period_ms) / (double)signal->period_ms;
-    const double middle = ((double)signal->min + (double)signal->max) / 2.0;
-    const double swing = ((double)signal->max - (double)signal->min) / 2.0;
-    return (int32_t)lround(middle + swing * sin(turn * 2.0 * 3.14159265358979323846));
-}
-
-static int32_t csv_value(const node_signal_t *signal, uint64_t time_ms)
-{
-    const uint64_t at_ms = signal->period_ms != 0 ? time_ms % signal->period_ms : 0;
-    size_t i = signal->point_count - 1;
-    while (i > 0 && signal->points[i].time_ms > at_ms) {
-        i--;
-    }
-    return signal->points[i].value;
-}
-
-int32_t sim_node_signal_value(const node_signal_t *signal, uint64_t time_ms)
-{
-    switch (signal->kind) {
-    case NODE_SIGNAL_SINE:
-        return sine_value(signal, time_ms);
-    case NODE_SIGNAL_SQUARE: /* the lower half first */
-        return time_ms % signal->period_ms < signal->period_ms / 2 ? signal->min : signal->max;
-    case NODE_SIGNAL_CSV:
-        return csv_value(signal, time_ms);
-    default:
-        return signal->min;
-    }
-}
-
-int32_t sim_node_scale(int32_t value, const profile_type_t *from, const profile_type_t *to)
-{
-    int32_t from_min = 0;
-    int32_t from_max = 1;
-    int32_t to_min = 0;
-    int32_t to_max = 1;
-    (void)profile_type_range(from, &from_min, &from_max);
-    (void)profile_type_range(to, &to_min, &to_max);
-    const int64_t span = (int64_t)from_max - from_min;
-    const int64_t scaled = ((int64_t)value - from_min) * ((int64_t)to_max - to_min);
-    return (int32_t)(to_min + (scaled + span / 2) / span);
-}
-
 /* --- outputs --- */
 
 /* What came last at an input, in the source's units. An input that was not told its source's type and profile
@@ -103,9 +55,9 @@ static void send_output(sim_node_t *node, uint8_t channel)
         if (!input_value(node, signal->source, &source, &value)) {
             return;
         }
-        value = sim_node_scale(value, &source, type);
+        value = node_signal_scale(value, &source, type);
     } else {
-        value = sim_node_signal_value(signal, (node->now_us - node->start_us) / 1000u);
+        value = node_signal_value(signal, (node->now_us - node->start_us) / 1000u);
     }
     const uint8_t len = profile_type_put(type, value, bytes);
     (void)pdcp_device_send(&node->device, ms_of(node->now_us), channel, bytes, len);

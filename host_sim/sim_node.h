@@ -61,11 +61,4 @@ uint32_t sim_node_store_errors(const sim_node_t *node);
  * value is null when it is not known. */
 void sim_node_print(FILE *out, const sim_node_event_t *event);
 
-/* Value of a signal at this time since the start, for every kind but copy. */
-int32_t sim_node_signal_value(const node_signal_t *signal, uint64_t time_ms);
-
-/* Maps a value from the full range of one type to the full range of another, rounded. Both types have a
- * range. */
-int32_t sim_node_scale(int32_t value, const profile_type_t *from, const profile_type_t *to);
-
 #endif

@@ -239,19 +239,24 @@ static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *
     }
 }
 
-/* Any answer of a device whose identity has asked again shows that the asking one is another (D-BUS-6). */
-static void conclude_check(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+/* The check of a device whose identity has asked again (D-BUS-6): any answer shows that the asking one is
+ * another. True: it was reset and is bound afresh; whoever waited for its reply has been told. */
+static bool conclude_check(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
 {
     if (!node_of(arb, node)->asked_again || !reply->done) {
-        return;
+        return false;
     }
     const bool answered = reply->status != PDCP_ERR_NO_ANSWER;
     const pdcp_bind_result_t result = pdcp_bind_after_check(&arb->bind, &arb->bus, now_ms, node, answered);
     after_bind(arb, now_ms, node, result);
+    return result == PDCP_BIND_GRANTED;
 }
 
 static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
 {
+    if (conclude_check(arb, now_ms, node, reply)) {
+        return;
+    }
     switch ((pdcp_client_t)reply->client) {
     case PDCP_CLIENT_SETUP:
         pdcp_setup_on_reply(&arb->bus, now_ms, node, reply);
@@ -268,7 +273,6 @@ static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_
     default:
         break;
     }
-    conclude_check(arb, now_ms, node, reply);
 }
 
 static bool is_from_device(uint8_t code)

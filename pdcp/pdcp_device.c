@@ -197,9 +197,6 @@ static void enter_bound(pdcp_device_t *dev, uint32_t now_ms)
 
 static void enter_alone(pdcp_device_t *dev)
 {
-    if (dev->bulk.mode == PDCP_DEVICE_BULK_GET) {
-        dev->stats.bulk_failed++;
-    }
     dev->bulk.mode = PDCP_DEVICE_BULK_IDLE;
     safe_inputs(dev);
 }
@@ -352,7 +349,7 @@ static const struct {
 
 static void dispatch(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg, bool broadcast)
 {
-    for (uint8_t i = 0; i < sizeof requests / sizeof requests[0]; i++) {
+    for (unsigned i = 0; i < sizeof requests / sizeof requests[0]; i++) {
         if (requests[i].code != msg->code || (broadcast && !requests[i].to_all)) {
             continue;
         }

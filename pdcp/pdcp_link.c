@@ -60,19 +60,23 @@ static uint8_t find_source(const pdcp_bus_t *bus, const pdcp_channel_t *input)
     return channel != PDCP_NONE && bus->nodes.channels[channel].transfer == PDCP_OUTPUT ? channel : PDCP_NONE;
 }
 
-/* An output that no active link needs any more is to be disabled; the job's own link counts as needing it. */
-static void release_output(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t output)
+static bool output_is_needed(const pdcp_bus_t *bus, uint8_t output)
 {
-    if (!is_ready(bus, output) || !bus->nodes.channels[output].enabled) {
-        return;
-    }
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &bus->nodes.channels[i];
         if (input->node != PDCP_NONE && input->feed == output && input->link == PDCP_LINK_ACTIVE) {
-            return;
+            return true;
         }
     }
-    put_todo(link, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
+    return false;
+}
+
+/* An output that no active link needs any more is to be disabled. */
+static void release_output(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t output)
+{
+    if (is_ready(bus, output) && bus->nodes.channels[output].enabled && !output_is_needed(bus, output)) {
+        put_todo(link, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
+    }
 }
 
 bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input)
@@ -273,7 +277,7 @@ static void begin(pdcp_link_t *link, pdcp_todo_t kind, uint8_t input, uint8_t ou
     link->input = input;
     link->output = output;
     link->step = (uint8_t)step;
-    link->undoing = kind == PDCP_TODO_SILENCE || kind == PDCP_TODO_REMOVE;
+    link->undoing = kind != PDCP_TODO_CONNECT && kind != PDCP_TODO_UPDATE;
     link->once = false;
     link->for_host = false;
     link->output_was_on = false;
@@ -291,12 +295,23 @@ static void tell_link(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
     }
 }
 
+/* What must not go on hearing or sending is told so until it answers or its device is lost. */
+static void silence_again(pdcp_link_t *link, pdcp_channel_t *channel)
+{
+    if (channel != NULL && channel->enabled && channel->todo == PDCP_TODO_NONE) {
+        put_todo(link, channel, PDCP_TODO_AGAIN);
+    }
+}
+
 /* The link of an input could not be made: it is what it was before, or remembered as inactive; one that
  * worked is made anew. */
 static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = channel_of(bus, link->input);
     pdcp_bus_count(bus, PDCP_STAT_LINK_FAILED);
+    if (!link->output_was_on) {
+        silence_again(link, channel_of(bus, link->output));
+    }
     if (input == NULL) {
         return;
     }
@@ -305,6 +320,7 @@ static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus)
         input->link = PDCP_LINK_INACTIVE;
         put_todo(link, input, PDCP_TODO_CONNECT);
     }
+    silence_again(link, input);
 }
 
 static void settle_made(pdcp_link_t *link, pdcp_bus_t *bus)
@@ -315,9 +331,13 @@ static void settle_made(pdcp_link_t *link, pdcp_bus_t *bus)
     }
 }
 
-static void settle_removed(pdcp_link_t *link, pdcp_bus_t *bus)
+static void settle_silenced(pdcp_link_t *link, pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = channel_of(bus, link->input);
+    if (link->status == PDCP_ERR_NO_ANSWER) {
+        silence_again(link, input);
+        silence_again(link, channel_of(bus, link->output));
+    }
     if (input != NULL && link->kind == PDCP_TODO_REMOVE) {
         input->link = PDCP_LINK_NONE;
         input->feed = PDCP_NONE;
@@ -332,7 +352,7 @@ static void end(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
     link->active = false;
     link->due = true;
     if (!making) {
-        settle_removed(link, bus);
+        settle_silenced(link, bus);
     } else if (link->status == PDCP_OK) {
         settle_made(link, bus);
     } else {
@@ -410,7 +430,7 @@ static bool step_possible(const pdcp_link_t *link, const pdcp_bus_t *bus)
 static bool send_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
 {
     const uint8_t number = is_input_step(link->step) ? link->input : link->output;
-    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    pdcp_channel_t *channel = &bus->nodes.channels[number];
     if (link->step <= STEP_READ_SERIAL) {
         const uint8_t read = link->step == STEP_READ_VID_PID ? PDCP_IN_SOURCE_VID_PID : PDCP_IN_SOURCE_SERIAL;
         pdcp_request_get(bus, now_ms, channel->node, PDCP_CLIENT_LINK, channel->index, read, PDCP_VALUE_MAX);
@@ -421,6 +441,9 @@ static bool send_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
     const uint8_t len = value_of(link, bus, &param, bytes);
     if (len == 0) {
         return false;
+    }
+    if (param == PDCP_CH_ENABLED && bytes[0] != 0) {
+        channel->enabled = true; /* from now on it may be */
     }
     pdcp_request_set(bus, now_ms, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
     if (link->once) {
@@ -506,8 +529,11 @@ static void on_failure(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp
         run(link, bus, now_ms);
         return;
     }
-    if (status == PDCP_ERR_NO_ANSWER && is_input_step(link->step)) {
-        link->step = link->last_step; /* the rest is for the same silent device */
+    if (status == PDCP_ERR_NO_ANSWER) {
+        link->status = (int8_t)status;
+        if (is_input_step(link->step)) {
+            link->step = link->last_step; /* the rest is for the same silent device */
+        }
     }
     go_on(link, bus, now_ms);
 }
@@ -532,6 +558,17 @@ void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, con
     go_on(link, bus, now_ms);
 }
 
+static void start_silence(pdcp_link_t *link, const pdcp_bus_t *bus, uint8_t number)
+{
+    if (bus->nodes.channels[number].transfer == PDCP_INPUT) {
+        begin(link, PDCP_TODO_SILENCE, number, PDCP_NONE, STEP_INPUT_ON);
+        link->last_step = STEP_NODES;
+    } else if (!output_is_needed(bus, number)) { /* nor by a link made meanwhile */
+        begin(link, PDCP_TODO_SILENCE, PDCP_NONE, number, STEP_OUTPUT_ON);
+        link->last_step = STEP_OUTPUT_ON;
+    }
+}
+
 /* Starts the job that a channel has to do, if it can be done now. */
 static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
 {
@@ -540,13 +577,8 @@ static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
     channel->todo = PDCP_TODO_NONE;
     switch (todo) {
     case PDCP_TODO_SILENCE:
-        if (channel->transfer == PDCP_OUTPUT) {
-            begin(link, todo, PDCP_NONE, number, STEP_OUTPUT_ON);
-            link->last_step = STEP_OUTPUT_ON;
-        } else {
-            begin(link, todo, number, PDCP_NONE, STEP_INPUT_ON);
-            link->last_step = STEP_NODES;
-        }
+    case PDCP_TODO_AGAIN:
+        start_silence(link, bus, number);
         break;
     case PDCP_TODO_REMOVE:
         begin(link, todo, number, PDCP_NONE, STEP_INPUT_ON);

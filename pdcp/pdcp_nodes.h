@@ -60,7 +60,8 @@ typedef enum {
                           nobody listens */
     PDCP_TODO_REMOVE,  /* input: back to unconnected */
     PDCP_TODO_CONNECT, /* input: make the link to the source that it has */
-    PDCP_TODO_UPDATE   /* input: its device has sent Update Data Channel */
+    PDCP_TODO_UPDATE,  /* input: its device has sent Update Data Channel */
+    PDCP_TODO_AGAIN    /* silence it: the write before was not answered, and everybody else comes first */
 } pdcp_todo_t;
 
 typedef struct {
@@ -71,7 +72,7 @@ typedef struct {
     uint8_t next;     /* the owner's next channel, PDCP_NONE: the last */
     uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
     uint8_t node_id;  /* outputs: 0 = none yet */
-    bool enabled;     /* transfer enabled as last written and answered */
+    bool enabled;     /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
     uint8_t todo;     /* pdcp_todo_t */
     /* Inputs only: */
     uint8_t link;         /* pdcp_link_status_t */

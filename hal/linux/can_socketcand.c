@@ -87,7 +87,6 @@ static void disconnect(can_socketcand_t *can, const char *reason)
     can->output_size = 0;
     can->input_at = 0;
     can->input_size = 0;
-    can->in_element = false;
     can->lost = false;
     can->base.health.state = HAL_CAN_DOWN;
     can->state = STATE_WAITING;

@@ -42,9 +42,7 @@ static bool make_fresh(hal_uart_t *uart, bool raw)
         return false;
     }
     struct termios settings;
-    /* The first takes what is still on its way to the line discipline, the second what is in it. */
-    bool ok = tcflush(uart->fd, TCOFLUSH) == 0 && tcflush(host_end, TCIFLUSH) == 0 &&
-              tcgetattr(host_end, &settings) == 0;
+    bool ok = tcflush(host_end, TCIFLUSH) == 0 && tcgetattr(host_end, &settings) == 0;
     if (ok && raw) {
         cfmakeraw(&settings);
         ok = tcsetattr(host_end, TCSANOW, &settings) == 0;
@@ -69,7 +67,7 @@ static void on_event(void *ctx, uint32_t events)
         uart->drained = false;
         uart->used = true;
     }
-    if ((events & (EPOLLOUT | EPOLLHUP)) != 0 && uart->awaiting_room) {
+    if ((events & EPOLLOUT) != 0 && uart->awaiting_room) {
         uart->awaiting_room = false;
         loop_modify(uart->loop, uart->fd, WATCH_BYTES);
     }

@@ -1,4 +1,6 @@
 /* Device descriptions: what is read from good ones, and the one line that bad ones get. */
+#define _POSIX_C_SOURCE 200809L /* mkdtemp, strdup */
+
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -138,12 +140,11 @@ static void test_channels(void)
 static void test_required_channel_8_takes_a_second_byte(void)
 {
     char text[1024] = DEVICE;
-    for (unsigned i = 1; i <= 8; i++) {
-        char part[80];
-        (void)snprintf(part, sizeof part, "[channel %u]\ndirection=input\ntype=0x5000\n", i);
-        (void)strcat(text, part);
+    size_t used = strlen(text);
+    for (unsigned i = 1; i <= 9; i++) {
+        used += (size_t)snprintf(&text[used], sizeof text - used, "[channel %u]\ndirection=%s\ntype=0x5000\n",
+                                 i, i < 9 ? "input" : "output\nrequired=8");
     }
-    (void)strcat(text, "[channel 9]\ndirection=output\ntype=0x5000\nrequired=8\n");
     load(text);
     TEST_ASSERT_NOT_NULL_MESSAGE(ini, error);
     TEST_ASSERT_EQUAL_UINT16(2, ini->desc.channels[8].required.len);
@@ -281,10 +282,10 @@ static void test_bad_replays(void)
     };
     for (unsigned i = 0; i < sizeof texts / sizeof texts[0]; i++) {
         write_file("s.csv", texts[i][0]);
-        (void)snprintf(want, sizeof want, ":8: %s/s.csv%s", folder, texts[i][1]);
+        (void)snprintf(want, sizeof want, ":8: signal: %s/s.csv%s", folder, texts[i][1]);
         BAD(DEVICE OUT1 "signal=csv s.csv\n", want);
     }
-    (void)snprintf(want, sizeof want, ":8: %s/none.csv: No such file or directory", folder);
+    (void)snprintf(want, sizeof want, ":8: signal: %s/none.csv: No such file or directory", folder);
     BAD(DEVICE OUT1 "signal=csv none.csv\n", want);
 }
 

@@ -1,16 +1,13 @@
-/* The codec against the tables of [PDCP 2.2, 3.1, 3.2]: every byte below was written from the source, none by the encoder. */
+/* The codec against the tables of [PDCP 2.2, 3.1, 3.2]: every byte below was written from the source, none by
+ * the encoder. */
 #include <string.h>
 
 #include "pdcp_codec.h"
 #include "unity.h"
 
-void setUp(void)
-{
-}
+void setUp(void) {}
 
-void tearDown(void)
-{
-}
+void tearDown(void) {}
 
 typedef struct {
     const char *name;
@@ -24,30 +21,69 @@ typedef struct {
 #define VID 0x1234
 #define PID 0x5678
 #define SN 0x9ABC
-#define IDENTITY {VID, PID, SN}
+#define IDENTITY                                                                                             \
+    {                                                                                                        \
+        VID, PID, SN                                                                                         \
+    }
 
 /* Little-endian words (D-BUS-1). Device id 17 = 11h; P, M, N as in [PDCP figure 2.3]. */
 static const golden_t golden[] = {
-    {"01 bind request, P=3 M=0", 0x611, 7, {0x01, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A},
-     {.code = 0x01, .identity = IDENTITY}, false},
-    {"81 bind answer, P=1 M=1", 0x311, 8, {0x81, 0x11, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A},
-     {.code = 0x81, .node_id = 0x11, .identity = IDENTITY}, false},
-    {"81 refused", 0x311, 8, {0x81, 0x00, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A},
-     {.code = 0x81, .node_id = 0, .identity = IDENTITY}, false},
+    {"01 bind request, P=3 M=0",
+     0x611,
+     7,
+     {0x01, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A},
+     {.code = 0x01, .identity = IDENTITY},
+     false},
+    {"81 bind answer, P=1 M=1",
+     0x311,
+     8,
+     {0x81, 0x11, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A},
+     {.code = 0x81, .node_id = 0x11, .identity = IDENTITY},
+     false},
+    {"81 refused",
+     0x311,
+     8,
+     {0x81, 0x00, 0x34, 0x12, 0x78, 0x56, 0xBC, 0x9A},
+     {.code = 0x81, .node_id = 0, .identity = IDENTITY},
+     false},
     {"03 get parameter", 0x311, 3, {0x03, 0x09, 0x02}, {.code = 0x03, .param = 9, .channel = 2}, false},
-    {"83 success, 4 bytes", 0x211, 8, {0x83, 0x01, 0x01, 0x02, 0x00, 0x53, 0x10, 0x11},
-     {.code = 0x83, .result = 1, .param = 1, .channel = 2, .len = 4, .value = {0x00, 0x53, 0x10, 0x11}}, false},
-    {"83 failure, no value", 0x211, 4, {0x83, 0x00, 0x0B, 0x02},
-     {.code = 0x83, .result = 0, .param = 11, .channel = 2}, false},
+    {"83 success, 4 bytes",
+     0x211,
+     8,
+     {0x83, 0x01, 0x01, 0x02, 0x00, 0x53, 0x10, 0x11},
+     {.code = 0x83, .result = 1, .param = 1, .channel = 2, .len = 4, .value = {0x00, 0x53, 0x10, 0x11}},
+     false},
+    {"83 failure, no value",
+     0x211,
+     4,
+     {0x83, 0x00, 0x0B, 0x02},
+     {.code = 0x83, .result = 0, .param = 11, .channel = 2},
+     false},
     {"83 use bulk", 0x211, 4, {0x83, 0x02, 0x07, 0x00}, {.code = 0x83, .result = 2, .param = 7}, false},
-    {"04 set parameter, 1 byte", 0x311, 4, {0x04, 0x04, 0x01, 0x01},
-     {.code = 0x04, .param = 4, .channel = 1, .len = 1, .value = {1}}, false},
-    {"04 set parameter, 4 bytes", 0x311, 7, {0x04, 0x05, 0x02, 0xFF, 0xFF, 0xFF, 0xFF},
-     {.code = 0x04, .param = 5, .channel = 2, .len = 4, .value = {0xFF, 0xFF, 0xFF, 0xFF}}, false},
-    {"84 success with value", 0x211, 5, {0x84, 0x01, 0x04, 0x01, 0x01},
-     {.code = 0x84, .result = 1, .param = 4, .channel = 1, .len = 1, .value = {1}}, false},
-    {"84 without a value is accepted", 0x211, 4, {0x84, 0x01, 0x04, 0x01},
-     {.code = 0x84, .result = 1, .param = 4, .channel = 1}, false},
+    {"04 set parameter, 1 byte",
+     0x311,
+     4,
+     {0x04, 0x04, 0x01, 0x01},
+     {.code = 0x04, .param = 4, .channel = 1, .len = 1, .value = {1}},
+     false},
+    {"04 set parameter, 4 bytes",
+     0x311,
+     7,
+     {0x04, 0x05, 0x02, 0xFF, 0xFF, 0xFF, 0xFF},
+     {.code = 0x04, .param = 5, .channel = 2, .len = 4, .value = {0xFF, 0xFF, 0xFF, 0xFF}},
+     false},
+    {"84 success with value",
+     0x211,
+     5,
+     {0x84, 0x01, 0x04, 0x01, 0x01},
+     {.code = 0x84, .result = 1, .param = 4, .channel = 1, .len = 1, .value = {1}},
+     false},
+    {"84 without a value is accepted",
+     0x211,
+     4,
+     {0x84, 0x01, 0x04, 0x01},
+     {.code = 0x84, .result = 1, .param = 4, .channel = 1},
+     false},
     {"08 suspend for 1000 ms", 0x311, 3, {0x08, 0xE8, 0x03}, {.code = 0x08, .word = 1000}, false},
     {"88", 0x211, 4, {0x88, 0x01, 0xE8, 0x03}, {.code = 0x88, .result = 1, .word = 1000}, false},
     {"88 as [PDCP 3.1] sizes it", 0x211, 1, {0x88}, {.code = 0x88, .result = 1}, true},
@@ -61,24 +97,49 @@ static const golden_t golden[] = {
     {"8B as [PDCP 3.1] sizes it", 0x211, 1, {0x8B}, {.code = 0x8B, .result = 1}, true},
     {"0C configure get bulk", 0x311, 3, {0x0C, 0x07, 0x00}, {.code = 0x0C, .param = 7}, false},
     {"0C as [PDCP 3.1] sizes it", 0x311, 5, {0x0C, 0x07, 0x00, 0x55, 0x55}, {.code = 0x0C, .param = 7}, true},
-    {"8C, 300 bytes", 0x211, 6, {0x8C, 0x01, 0x07, 0x00, 0x2C, 0x01},
-     {.code = 0x8C, .result = 1, .param = 7, .word = 300}, false},
-    {"0D configure set bulk", 0x311, 5, {0x0D, 0x07, 0x00, 0x2C, 0x01},
-     {.code = 0x0D, .param = 7, .word = 300}, false},
-    {"8D", 0x211, 6, {0x8D, 0x00, 0x07, 0x03, 0x2C, 0x01},
-     {.code = 0x8D, .result = 0, .param = 7, .channel = 3, .word = 300}, false},
-    {"0E packet of 6 bytes", 0x211, 8, {0x0E, 0xFF, 1, 2, 3, 4, 5, 6},
-     {.code = 0x0E, .packet_id = 0xFF, .len = 6, .value = {1, 2, 3, 4, 5, 6}}, false},
+    {"8C, 300 bytes",
+     0x211,
+     6,
+     {0x8C, 0x01, 0x07, 0x00, 0x2C, 0x01},
+     {.code = 0x8C, .result = 1, .param = 7, .word = 300},
+     false},
+    {"0D configure set bulk",
+     0x311,
+     5,
+     {0x0D, 0x07, 0x00, 0x2C, 0x01},
+     {.code = 0x0D, .param = 7, .word = 300},
+     false},
+    {"8D",
+     0x211,
+     6,
+     {0x8D, 0x00, 0x07, 0x03, 0x2C, 0x01},
+     {.code = 0x8D, .result = 0, .param = 7, .channel = 3, .word = 300},
+     false},
+    {"0E packet of 6 bytes",
+     0x211,
+     8,
+     {0x0E, 0xFF, 1, 2, 3, 4, 5, 6},
+     {.code = 0x0E, .packet_id = 0xFF, .len = 6, .value = {1, 2, 3, 4, 5, 6}},
+     false},
     {"0E packet of 1 byte", 0x311, 3, {0x0E, 0x00, 7}, {.code = 0x0E, .len = 1, .value = {7}}, false},
     {"8E", 0x311, 2, {0x8E, 0x01}, {.code = 0x8E, .result = 1}, false},
     {"0F update data channel", 0x211, 2, {0x0F, 0x02}, {.code = 0x0F, .channel = 2}, false},
     {"8F", 0x311, 3, {0x8F, 0x01, 0x02}, {.code = 0x8F, .result = 1, .channel = 2}, false},
     {"02 deprecated", 0x311, 2, {0x02, 0x01}, {.code = 0x02, .len = 1, .value = {1}}, false},
-    {"82 deprecated", 0x211, 6, {0x82, 1, 2, 3, 4, 5}, {.code = 0x82, .len = 5, .value = {1, 2, 3, 4, 5}}, false},
+    {"82 deprecated",
+     0x211,
+     6,
+     {0x82, 1, 2, 3, 4, 5},
+     {.code = 0x82, .len = 5, .value = {1, 2, 3, 4, 5}},
+     false},
     {"05 deprecated", 0x211, 4, {0x05, 1, 2, 3}, {.code = 0x05, .len = 3, .value = {1, 2, 3}}, false},
     {"85 deprecated", 0x311, 4, {0x85, 1, 2, 3}, {.code = 0x85, .len = 3, .value = {1, 2, 3}}, false},
-    {"06 deprecated", 0x211, 8, {0x06, 1, 2, 3, 4, 5, 6, 7},
-     {.code = 0x06, .len = 7, .value = {1, 2, 3, 4, 5, 6, 7}}, false},
+    {"06 deprecated",
+     0x211,
+     8,
+     {0x06, 1, 2, 3, 4, 5, 6, 7},
+     {.code = 0x06, .len = 7, .value = {1, 2, 3, 4, 5, 6, 7}},
+     false},
     {"86 deprecated", 0x311, 1, {0x86}, {.code = 0x86}, false},
     {"07 deprecated", 0x311, 2, {0x07, 0x20}, {.code = 0x07, .len = 1, .value = {0x20}}, false},
     {"87 deprecated", 0x211, 1, {0x87}, {.code = 0x87}, false},
@@ -132,25 +193,55 @@ static void test_every_message_encodes(void)
 static uint16_t accepted_dlcs(unsigned code)
 {
     switch (code) {
-    case 0x01: return 1u << 7;
-    case 0x02: case 0x07: case 0x0F: case 0x8E: return 1u << 2;
-    case 0x03: case 0x08: return 1u << 3;
-    case 0x04: return 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7;
-    case 0x05: return 1u << 4;
-    case 0x06: return 1u << 5 | 1u << 6 | 1u << 7 | 1u << 8;
-    case 0x09: case 0x0A: case 0x0B: case 0x86: case 0x87: return 1u << 1;
-    case 0x0C: return 1u << 3 | 1u << 5;
-    case 0x0D: return 1u << 5;
-    case 0x0E: return 1u << 3 | 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7 | 1u << 8;
-    case 0x81: return 1u << 8;
-    case 0x82: return 1u << 2 | 1u << 3 | 1u << 4 | 1u << 5 | 1u << 6;
-    case 0x83: case 0x84: return 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7 | 1u << 8;
-    case 0x85: return 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7;
-    case 0x88: return 1u << 1 | 1u << 4;
-    case 0x89: case 0x8B: return 1u << 1 | 1u << 2;
-    case 0x8C: case 0x8D: return 1u << 6;
-    case 0x8F: return 1u << 3;
-    default: return 0;
+    case 0x01:
+        return 1u << 7;
+    case 0x02:
+    case 0x07:
+    case 0x0F:
+    case 0x8E:
+        return 1u << 2;
+    case 0x03:
+    case 0x08:
+        return 1u << 3;
+    case 0x04:
+        return 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7;
+    case 0x05:
+        return 1u << 4;
+    case 0x06:
+        return 1u << 5 | 1u << 6 | 1u << 7 | 1u << 8;
+    case 0x09:
+    case 0x0A:
+    case 0x0B:
+    case 0x86:
+    case 0x87:
+        return 1u << 1;
+    case 0x0C:
+        return 1u << 3 | 1u << 5;
+    case 0x0D:
+        return 1u << 5;
+    case 0x0E:
+        return 1u << 3 | 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7 | 1u << 8;
+    case 0x81:
+        return 1u << 8;
+    case 0x82:
+        return 1u << 2 | 1u << 3 | 1u << 4 | 1u << 5 | 1u << 6;
+    case 0x83:
+    case 0x84:
+        return 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7 | 1u << 8;
+    case 0x85:
+        return 1u << 4 | 1u << 5 | 1u << 6 | 1u << 7;
+    case 0x88:
+        return 1u << 1 | 1u << 4;
+    case 0x89:
+    case 0x8B:
+        return 1u << 1 | 1u << 2;
+    case 0x8C:
+    case 0x8D:
+        return 1u << 6;
+    case 0x8F:
+        return 1u << 3;
+    default:
+        return 0;
     }
 }
 
@@ -188,7 +279,8 @@ static void test_identifier_fields(void)
     TEST_ASSERT_EQUAL_HEX16(0x3FE, pdcp_can_id(PDCP_PRIORITY_NORMAL, true, 254));
     TEST_ASSERT_EQUAL_HEX16(0x4FE, pdcp_can_id(PDCP_PRIORITY_LOW, false, 254));
     for (uint16_t id = 0; id <= CAN_FRAME_ID_MAX; id++) {
-        TEST_ASSERT_EQUAL_HEX16(id, pdcp_can_id(pdcp_id_priority(id), pdcp_id_from_arbitrator(id), pdcp_id_node(id)));
+        TEST_ASSERT_EQUAL_HEX16(
+            id, pdcp_can_id(pdcp_id_priority(id), pdcp_id_from_arbitrator(id), pdcp_id_node(id)));
     }
 }
 

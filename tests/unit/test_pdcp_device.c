@@ -681,8 +681,8 @@ static void test_malformed_frames_are_counted_and_not_answered(void)
     rx(0x311, "03 01 00"); /* another device's */
     rx(TO_ALL, "03 01 00");
     rx(TO_ALL, "0B");
-    for (uint8_t kind = CAN_FRAME_EXTENDED; kind <= CAN_FRAME_FD; kind++) {
-        odd.kind = kind;
+    for (unsigned kind = CAN_FRAME_EXTENDED; kind <= CAN_FRAME_FD; kind++) {
+        odd.kind = (uint8_t)kind;
         pdcp_device_on_frame(&dev, now, &odd);
     }
     QUIET();
@@ -946,7 +946,51 @@ static void test_input_that_is_unconnected_meanwhile_is_not_asked_for(void)
     pass_quietly(3000);
 }
 
+/* More inputs than the queue has places, on a bus that takes nothing for a while. */
+static void test_every_source_is_asked_for_though_the_queue_is_small(void)
+{
+    pdcp_device_channel_desc_t inputs[PDCP_DEVICE_CHANNELS_MAX];
+    pdcp_device_record_t record = blank_record(ID);
+    pdcp_device_desc_t wide = desc;
+    uint32_t asked = 0;
+    can_frame_t frame;
+    for (unsigned i = 0; i < PDCP_DEVICE_CHANNELS_MAX; i++) {
+        inputs[i] = channels[0];
+        record.sources[i].identity.vid = 2;
+    }
+    wide.channels = inputs;
+    wide.channel_count = PDCP_DEVICE_CHANNELS_MAX;
+    TEST_ASSERT_TRUE(pdcp_device_init(&dev, &wide, &port, &record, 1, now));
+    (void)step();
+    TX(BIND, "01 0200 0300 0400");
+    rx(TO, "81 10 0200 0300 0400");
+    TEST_ASSERT_EQUAL_UINT32(now + 10, step());
+    for (unsigned round = 0; round < 5; round++) {
+        advance(10);
+        while (pdcp_device_tx_peek(&dev, &frame)) {
+            pdcp_device_tx_pop(&dev);
+            if (frame.id == FROM) {
+                TEST_ASSERT_EQUAL_HEX8(0x0F, frame.data[0]);
+                asked |= (uint32_t)1 << (frame.data[1] - 1);
+            }
+        }
+    }
+    TEST_ASSERT_EQUAL_HEX32(0xFFFFFFFFu, asked);
+    TEST_ASSERT_EQUAL_UINT32(0, pdcp_device_stats(&dev)->tx_full);
+}
+
 /* --- silence of the arbitrator --- */
+
+static void test_silence_is_among_the_deadlines(void)
+{
+    bind_blank();
+    ANSWERED("04 0A 00 1027", "84 01 0A 00 1027"); /* a beacon every 10 s */
+    TEST_ASSERT_EQUAL_UINT32(now + 3000, step());
+    const uint32_t heard = now;
+    now += 1000;
+    rx(ARB_BEACON, "0A");
+    TEST_ASSERT_EQUAL_UINT32(heard + 4000, step());
+}
 
 static void test_silence_stops_streaming_and_makes_inputs_safe(void)
 {
@@ -1093,6 +1137,28 @@ static void test_bulk_get_repeats_a_packet_without_answer(void)
     TEST_ASSERT_EQUAL_UINT32(1, pdcp_device_stats(&dev)->bulk_failed);
     rx(TO, "8E 01");
     QUIET();
+}
+
+static void test_bulk_get_has_three_tries_for_each_packet(void)
+{
+    bind_blank();
+    rx(TO, "0C 09 03");
+    TX(FROM, "8C 01 09 03 0800");
+    TX(FROM, "0E 00 200000000000");
+    for (unsigned i = 0; i < 2; i++) {
+        advance(100);
+        TX(FROM, "0E 00 200000000000");
+    }
+    rx(TO, "8E 01");
+    TX(FROM, "0E 01 0001");
+    for (unsigned i = 0; i < 2; i++) {
+        advance(100);
+        TX(FROM, "0E 01 0001");
+        QUIET();
+    }
+    rx(TO, "8E 01");
+    QUIET();
+    TEST_ASSERT_EQUAL_UINT32(0, pdcp_device_stats(&dev)->bulk_failed);
 }
 
 static void test_bulk_get_refused_or_started_anew(void)
@@ -1274,6 +1340,8 @@ int main(void)
     RUN_TEST(test_reset_drops_what_waits);
     RUN_TEST(test_stored_sources_are_asked_for_until_answered);
     RUN_TEST(test_input_that_is_unconnected_meanwhile_is_not_asked_for);
+    RUN_TEST(test_every_source_is_asked_for_though_the_queue_is_small);
+    RUN_TEST(test_silence_is_among_the_deadlines);
     RUN_TEST(test_silence_stops_streaming_and_makes_inputs_safe);
     RUN_TEST(test_devices_are_no_sign_of_an_arbitrator);
     RUN_TEST(test_answers_while_alone_come_with_the_arbitrator);
@@ -1283,6 +1351,7 @@ int main(void)
     RUN_TEST(test_bulk_get_of_short_and_of_missing_values);
     RUN_TEST(test_bulk_get_packet_ids_wrap);
     RUN_TEST(test_bulk_get_repeats_a_packet_without_answer);
+    RUN_TEST(test_bulk_get_has_three_tries_for_each_packet);
     RUN_TEST(test_bulk_get_refused_or_started_anew);
     RUN_TEST(test_bulk_set_of_an_extra);
     RUN_TEST(test_bulk_set_of_a_source);

@@ -1,5 +1,7 @@
 /* Simulated devices in virtual time: signals, copies, what terminal inputs report, and the state file. The
  * clock starts so that the device's milliseconds wrap during the tests. */
+#define _POSIX_C_SOURCE 200809L /* mkdtemp, strdup */
+
 #include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -171,19 +173,19 @@ static void test_signal_values(void)
     const node_signal_t square = {.kind = NODE_SIGNAL_SQUARE, .min = 1, .max = 2, .period_ms = 100};
     const node_signal_t csv = {.kind = NODE_SIGNAL_CSV, .points = points, .point_count = 3, .period_ms = 400};
     const node_signal_t single = {.kind = NODE_SIGNAL_CSV, .points = points, .point_count = 1};
-    TEST_ASSERT_EQUAL_INT32(-3, sim_node_signal_value(&constant, 99));
-    TEST_ASSERT_EQUAL_INT32(100, sim_node_signal_value(&sine, 0));
-    TEST_ASSERT_EQUAL_INT32(200, sim_node_signal_value(&sine, 250));
-    TEST_ASSERT_EQUAL_INT32(0, sim_node_signal_value(&sine, 750));
-    TEST_ASSERT_EQUAL_INT32(171, sim_node_signal_value(&sine, 1125)); /* 100 + 100 sin 45 degrees */
-    TEST_ASSERT_EQUAL_INT32(1, sim_node_signal_value(&square, 49));
-    TEST_ASSERT_EQUAL_INT32(2, sim_node_signal_value(&square, 50));
-    TEST_ASSERT_EQUAL_INT32(1, sim_node_signal_value(&square, 100));
-    TEST_ASSERT_EQUAL_INT32(5, sim_node_signal_value(&csv, 99));
-    TEST_ASSERT_EQUAL_INT32(6, sim_node_signal_value(&csv, 249));
-    TEST_ASSERT_EQUAL_INT32(7, sim_node_signal_value(&csv, 399));
-    TEST_ASSERT_EQUAL_INT32(5, sim_node_signal_value(&csv, 400));
-    TEST_ASSERT_EQUAL_INT32(5, sim_node_signal_value(&single, 12345));
+    TEST_ASSERT_EQUAL_INT32(-3, node_signal_value(&constant, 99));
+    TEST_ASSERT_EQUAL_INT32(100, node_signal_value(&sine, 0));
+    TEST_ASSERT_EQUAL_INT32(200, node_signal_value(&sine, 250));
+    TEST_ASSERT_EQUAL_INT32(0, node_signal_value(&sine, 750));
+    TEST_ASSERT_EQUAL_INT32(171, node_signal_value(&sine, 1125)); /* 100 + 100 sin 45 degrees */
+    TEST_ASSERT_EQUAL_INT32(1, node_signal_value(&square, 49));
+    TEST_ASSERT_EQUAL_INT32(2, node_signal_value(&square, 50));
+    TEST_ASSERT_EQUAL_INT32(1, node_signal_value(&square, 100));
+    TEST_ASSERT_EQUAL_INT32(5, node_signal_value(&csv, 99));
+    TEST_ASSERT_EQUAL_INT32(6, node_signal_value(&csv, 249));
+    TEST_ASSERT_EQUAL_INT32(7, node_signal_value(&csv, 399));
+    TEST_ASSERT_EQUAL_INT32(5, node_signal_value(&csv, 400));
+    TEST_ASSERT_EQUAL_INT32(5, node_signal_value(&single, 12345));
 }
 
 static void check_scale(uint16_t from_word, int32_t value, uint16_t to_word, int32_t want)
@@ -192,7 +194,7 @@ static void check_scale(uint16_t from_word, int32_t value, uint16_t to_word, int
     profile_type_t to;
     (void)profile_type_decode(from_word, &from);
     (void)profile_type_decode(to_word, &to);
-    TEST_ASSERT_EQUAL_INT32(want, sim_node_scale(value, &from, &to));
+    TEST_ASSERT_EQUAL_INT32(want, node_signal_scale(value, &from, &to));
 }
 
 static void test_full_range_maps_to_full_range(void)

@@ -1,0 +1,237 @@
+#include "exchange.h"
+
+#include <stdio.h>
+#include <stdlib.h>
+#include <string.h>
+
+#include "unity.h"
+
+static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
+{
+    exchange_t *x = ctx;
+    (void)now_ms;
+    TEST_ASSERT_LESS_THAN_MESSAGE(EXCHANGE_EVENTS, x->event_count, "too many events");
+    x->events[x->event_count++] = *event;
+}
+
+can_frame_t exchange_frame(const char *text)
+{
+    can_frame_t frame;
+    char *at;
+    memset(&frame, 0, sizeof frame);
+    frame.id = (uint16_t)strtoul(text, &at, 16);
+    TEST_ASSERT_EQUAL_MESSAGE('#', *at, text);
+    at++;
+    while (*at != '\0') {
+        if (*at == ' ') {
+            at++;
+            continue;
+        }
+        const char byte[3] = {at[0], at[1], '\0'};
+        TEST_ASSERT_LESS_THAN_MESSAGE(8, frame.dlc, text);
+        frame.data[frame.dlc++] = (uint8_t)strtoul(byte, NULL, 16);
+        at += 2;
+    }
+    return frame;
+}
+
+static void to_text(const can_frame_t *frame, char *text, size_t size)
+{
+    int used = snprintf(text, size, "%03X#", frame->id);
+    for (uint8_t i = 0; i < frame->dlc; i++) {
+        used += snprintf(&text[used], size - (size_t)used, "%02X", frame->data[i]);
+    }
+}
+
+void exchange_start(exchange_t *x, uint32_t now_ms)
+{
+    memset(x, 0, sizeof *x);
+    x->now_ms = now_ms;
+    x->arb = &x->alone;
+    pdcp_arb_init(x->arb, now_ms, on_event, x);
+    exchange_tx(x, "100#0A");
+    exchange_silence(x);
+}
+
+void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings,
+                        uint32_t now_ms)
+{
+    memset(x, 0, sizeof *x);
+    x->now_ms = now_ms;
+    x->app = app;
+    x->arb = &app->arb;
+    arb_app_init(app, port, settings, now_ms);
+    arb_app_observe(app, on_event, x);
+    exchange_tx(x, "100#0A");
+    exchange_silence(x);
+}
+
+void exchange_step(exchange_t *x)
+{
+    if (x->app != NULL) {
+        (void)arb_app_step(x->app, x->now_ms);
+    } else {
+        (void)pdcp_arb_step(x->arb, x->now_ms);
+    }
+}
+
+void exchange_rx(exchange_t *x, const char *text)
+{
+    const can_frame_t frame = exchange_frame(text);
+    pdcp_arb_on_frame(x->arb, x->now_ms, &frame);
+    exchange_step(x);
+}
+
+void exchange_tx(exchange_t *x, const char *text)
+{
+    char want[40];
+    char have[40] = "nothing";
+    const can_frame_t frame = exchange_frame(text);
+    to_text(&frame, want, sizeof want);
+    exchange_step(x);
+    const can_frame_t *sent = pdcp_arb_tx_peek(x->arb);
+    if (sent != NULL) {
+        to_text(sent, have, sizeof have);
+        pdcp_arb_tx_pop(x->arb);
+    }
+    TEST_ASSERT_EQUAL_STRING(want, have);
+}
+
+void exchange_silence(exchange_t *x)
+{
+    char have[40] = "nothing";
+    exchange_step(x);
+    const can_frame_t *sent = pdcp_arb_tx_peek(x->arb);
+    if (sent != NULL) {
+        to_text(sent, have, sizeof have);
+    }
+    TEST_ASSERT_EQUAL_STRING("nothing", have);
+}
+
+int exchange_drain(exchange_t *x)
+{
+    int count = 0;
+    exchange_step(x);
+    while (pdcp_arb_tx_peek(x->arb) != NULL) {
+        pdcp_arb_tx_pop(x->arb);
+        count++;
+    }
+    return count;
+}
+
+void exchange_wait(exchange_t *x, uint32_t ms)
+{
+    x->now_ms += ms;
+    exchange_step(x);
+}
+
+void exchange_pass(exchange_t *x, uint32_t ms)
+{
+    for (uint32_t i = 0; i < ms; i++) {
+        exchange_wait(x, 1);
+        const can_frame_t *sent = pdcp_arb_tx_peek(x->arb);
+        if (sent != NULL && sent->id == 0x100) {
+            pdcp_arb_tx_pop(x->arb);
+        }
+    }
+}
+
+int exchange_count(const exchange_t *x, pdcp_event_kind_t kind)
+{
+    int count = 0;
+    for (int i = 0; i < x->event_count; i++) {
+        count += x->events[i].kind == kind ? 1 : 0;
+    }
+    return count;
+}
+
+const pdcp_event_t *exchange_last(const exchange_t *x, pdcp_event_kind_t kind)
+{
+    for (int i = x->event_count; i-- > 0;) {
+        if (x->events[i].kind == kind) {
+            return &x->events[i];
+        }
+    }
+    TEST_FAIL_MESSAGE("no such event");
+    return NULL;
+}
+
+void exchange_clear(exchange_t *x)
+{
+    x->event_count = 0;
+}
+
+void exchange_pairs(exchange_t *x, const exchange_pair_t *pairs)
+{
+    for (; pairs->tx != NULL; pairs++) {
+        exchange_tx(x, pairs->tx);
+        if (pairs->rx != NULL) {
+            exchange_rx(x, pairs->rx);
+        }
+    }
+}
+
+void exchange_run(exchange_t *x, const exchange_pair_t *pairs)
+{
+    exchange_pairs(x, pairs);
+    exchange_silence(x);
+}
+
+void exchange_add_output(exchange_t *x, const char *out_id)
+{
+    char set_id[40];
+    char answer[40];
+    (void)snprintf(set_id, sizeof set_id, "311#04 05 01 %s", out_id);
+    (void)snprintf(answer, sizeof answer, "211#84 01 05 01 %s", out_id);
+    const exchange_pair_t pairs[] = {
+        {"311#81 11 0200 0200 0400", NULL},
+        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
+        {"311#03 02 00", "211#83 01 02 00 0400"},
+        {"311#03 06 00", "211#83 00 06 00"},
+        {"311#03 0B 00", "211#83 01 0B 00 6400"},
+        {"311#03 0A 00", "211#83 01 0A 00 F401"},
+        {"311#03 09 00", "211#83 01 09 00 01"},
+        {"311#04 04 01 00", "211#84 01 04 01 00"},
+        {"311#03 03 01", "211#83 01 03 01 02"},
+        {"311#03 01 01", "211#83 01 01 01 0050 2021"},
+        {"311#03 09 01", "211#83 00 09 01"},
+        {"311#03 0A 01", "211#83 00 0A 01"},
+        {set_id, answer},
+        {NULL, NULL},
+    };
+    exchange_rx(x, "611#01 0200 0200 0400");
+    exchange_pairs(x, pairs);
+    exchange_rx(x, "011#0A");
+}
+
+void exchange_add_input(exchange_t *x)
+{
+    static const exchange_pair_t pairs[] = {
+        {"312#81 12 0200 0200 0600", NULL},
+        {"312#03 01 00", "212#83 01 01 00 0200 0200"},
+        {"312#03 02 00", "212#83 01 02 00 0600"},
+        {"312#03 06 00", "212#83 00 06 00"},
+        {"312#03 0B 00", "212#83 01 0B 00 6400"},
+        {"312#03 0A 00", "212#83 01 0A 00 F401"},
+        {"312#03 09 00", "212#83 01 09 00 01"},
+        {"312#04 04 01 00", "212#84 01 04 01 00"},
+        {"312#03 03 01", "212#83 01 03 01 01"},
+        {"312#03 01 01", "212#83 01 01 01 0053 1011"},
+        {"312#03 05 01", "212#83 01 05 01 FFFF FFFF"},
+        {"312#03 06 01", "212#83 01 06 01 FFFF FF"},
+        {"312#03 08 01", "212#83 01 08 01 0000 0000"},
+        {"312#03 09 01", "212#83 00 09 01"},
+        {"312#03 0A 01", "212#83 00 0A 01"},
+        {"312#03 0B 01", "212#83 01 0B 01 1011"},
+        {NULL, NULL},
+    };
+    exchange_rx(x, "612#01 0200 0200 0600");
+    exchange_pairs(x, pairs);
+    exchange_rx(x, "012#0A");
+}
+
+void exchange_beacons(exchange_t *x)
+{
+    exchange_rx(x, "011#0A");
+    exchange_rx(x, "012#0A");
+}

@@ -1,0 +1,74 @@
+/* An arbitrator on a bench: frames are handed in and expected as text in candump's form, ID#DATA in
+ * hexadecimal, with spaces wherever they help. Time stands still unless a test moves it. */
+#ifndef EXCHANGE_H
+#define EXCHANGE_H
+
+#include "arb_app.h"
+
+enum { EXCHANGE_EVENTS = 64 };
+
+typedef struct {
+    pdcp_arb_t *arb; /* alone, or the one of app */
+    arb_app_t *app;  /* NULL: the arbitrator stands alone */
+    pdcp_arb_t alone;
+    uint32_t now_ms;
+    pdcp_event_t events[EXCHANGE_EVENTS]; /* since they were cleared */
+    int event_count;
+} exchange_t;
+
+/* A fresh arbitrator at now_ms, whose first beacon has left already. */
+void exchange_start(exchange_t *x, uint32_t now_ms);
+
+/* The same with a whole application, whose port's can_send must refuse: its frames are taken from its queue.
+ */
+void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings,
+                        uint32_t now_ms);
+
+/* Does what is due. */
+void exchange_step(exchange_t *x);
+
+can_frame_t exchange_frame(const char *text);
+
+/* A frame from the bus, then a step. */
+void exchange_rx(exchange_t *x, const char *text);
+
+/* The next frame that leaves must be this one. */
+void exchange_tx(exchange_t *x, const char *text);
+
+/* No frame leaves. */
+void exchange_silence(exchange_t *x);
+
+/* Takes and forgets whatever leaves; returns how many frames. */
+int exchange_drain(exchange_t *x);
+
+/* Moves the time on in one go and steps. */
+void exchange_wait(exchange_t *x, uint32_t ms);
+
+/* Moves the time on millisecond by millisecond; the arbitrator's beacons are taken out. */
+void exchange_pass(exchange_t *x, uint32_t ms);
+
+/* How often an event of this kind has come since exchange_clear. */
+int exchange_count(const exchange_t *x, pdcp_event_kind_t kind);
+const pdcp_event_t *exchange_last(const exchange_t *x, pdcp_event_kind_t kind);
+void exchange_clear(exchange_t *x);
+
+/* A table of text pairs, what leaves and what comes back, ended by NULL. An answer of NULL: none comes. */
+typedef struct {
+    const char *tx;
+    const char *rx;
+} exchange_pair_t;
+void exchange_pairs(exchange_t *x, const exchange_pair_t *pairs);
+
+/* The same, and nothing leaves behind them. */
+void exchange_run(exchange_t *x, const exchange_pair_t *pairs);
+
+/* Binds and sets up device 0002:0002:0004 as id 11h: one output, index 1, type 5000h, profile 2120h, gets
+ * node id FEh if that is free (out_id). And device 0002:0002:0006 as id 12h: one input, index 1, type 5300h,
+ * profile 1110h, unconnected. Both have beaconed. */
+void exchange_add_output(exchange_t *x, const char *out_id);
+void exchange_add_input(exchange_t *x);
+
+/* The beacon of these devices, so that they stay alive. */
+void exchange_beacons(exchange_t *x);
+
+#endif

@@ -1,0 +1,508 @@
+/* Links (pdcp-bus.md 7, 8, 9): D-BUS-7, -10, -14, -19, -20, with hand-written frames. */
+#include "exchange.h"
+#include "unity.h"
+
+static exchange_t x;
+
+/* Device 0002:0002:0004 id 11h, output 1 with id FEh; device 0002:0002:0006 id 12h, input 1. */
+void setUp(void)
+{
+    exchange_start(&x, 0xFFFFFF00u);
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    exchange_clear(&x);
+}
+
+void tearDown(void) {}
+
+static uint8_t output(void)
+{
+    return pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+}
+
+static uint8_t input(void)
+{
+    return pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+}
+
+static const pdcp_channel_t *the_input(void)
+{
+    return &x.arb->bus.nodes.channels[input()];
+}
+
+/* pdcp-bus.md 8: 5, 6, 8, 7 and enabled to the input, then enabled to the output. */
+static const exchange_pair_t making[] = {
+    {"312#04 05 01 0200 0200", "212#84 01 05 01 0200 0200"},
+    {"312#04 06 01 0400 01", "212#84 01 06 01 0400 01"},
+    {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
+    {"312#04 07 01 11 FE", "212#84 01 07 01 11 FE"},
+    {"312#04 04 01 01", "212#84 01 04 01 01"},
+    {"311#04 04 01 01", "211#84 01 04 01 01"},
+    {NULL, NULL},
+};
+
+static void make_link(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    exchange_run(&x, making);
+}
+
+static void test_a_link_is_made_in_order(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    for (const exchange_pair_t *pair = making; pair->tx != NULL; pair++) {
+        TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE,
+                              the_input()->link); /* 2 only when the last write is answered */
+        exchange_tx(&x, pair->tx);
+        exchange_silence(&x);
+        exchange_rx(&x, pair->rx);
+    }
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
+}
+
+/* D-API-6: repeated, it succeeds without traffic. */
+static void test_the_same_link_again_costs_nothing(void)
+{
+    make_link();
+    exchange_clear(&x);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
+    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_WISH)->status);
+}
+
+static void test_what_cannot_be_a_link(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, input(), output()));
+    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, PDCP_NONE, input()));
+    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, output(), 100)); /* a free entry */
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_ERR_BUSY, pdcp_arb_connect(x.arb, output(), input()));
+}
+
+/* What undoes a link that failed at a step: the steps before it and the step itself, in reverse (the refused
+ * write may have been carried out). */
+static const exchange_pair_t undoing[] = {
+    {"312#04 05 01 FFFF FFFF", "212#84 01 05 01 FFFF FFFF"},
+    {"312#04 06 01 FFFF FF", "212#84 01 06 01 FFFF FF"},
+    {"312#04 08 01 0000 0000", "212#84 01 08 01 0000 0000"},
+    {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
+    {"312#04 04 01 00", "212#84 01 04 01 00"},
+    {"311#04 04 01 00", "211#84 01 04 01 00"},
+};
+
+static const char *const refusals[] = {
+    "212#84 00 05 01", "212#84 00 06 01", "212#84 00 08 01",
+    "212#84 00 07 01", "212#84 00 04 01", "211#84 00 04 01",
+};
+
+static void fail_at(int step)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    for (int i = 0; i < step; i++) {
+        exchange_tx(&x, making[i].tx);
+        exchange_rx(&x, making[i].rx);
+    }
+    exchange_tx(&x, making[step].tx);
+    exchange_rx(&x, refusals[step]);
+    for (int i = step; i >= 0; i--) {
+        exchange_tx(&x, undoing[i].tx);
+        TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_WISH));
+        exchange_rx(&x, undoing[i].rx);
+    }
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, the_input()->source_index);
+    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_FALSE(x.arb->bus.nodes.channels[output()].enabled);
+    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_LINK_FAILED]);
+}
+
+static void test_refused_vid_and_pid_is_undone(void)
+{
+    fail_at(0);
+}
+
+static void test_refused_serial_is_undone(void)
+{
+    fail_at(1);
+}
+
+static void test_refused_node_ids_are_undone(void)
+{
+    fail_at(3);
+}
+
+static void test_refused_input_is_undone(void)
+{
+    fail_at(4);
+}
+
+static void test_refused_output_is_undone(void)
+{
+    fail_at(5);
+}
+
+/* D-BUS-20: a device without the profile layer refuses parameter 8, and is linked all the same. */
+static void test_an_input_without_parameter_8_is_linked(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    for (int i = 0; making[i].tx != NULL; i++) {
+        exchange_tx(&x, making[i].tx);
+        exchange_rx(&x, i == 2 ? refusals[i] : making[i].rx);
+    }
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+/* A device that falls silent in the middle: the failed write is undone with one try, not three. */
+static void test_silence_in_the_middle_ends_the_link(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    exchange_tx(&x, making[0].tx);
+    exchange_rx(&x, making[0].rx);
+    for (int i = 0; i < 3; i++) {
+        exchange_tx(&x, making[1].tx);
+        exchange_pass(&x, 100);
+    }
+    exchange_tx(&x, undoing[1].tx);
+    exchange_pass(&x, 100);
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+}
+
+static void test_a_lost_answer_is_repeated_and_the_link_made(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    exchange_tx(&x, making[0].tx);
+    exchange_pass(&x, 100);
+    exchange_run(&x, making);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+/* Removing: input off, source back to unconnected; the output off when its last link goes. */
+static void test_a_link_is_removed(void)
+{
+    static const exchange_pair_t removing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01 00"},
+        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
+        {"312#04 08 01 0000 0000", "212#84 01 08 01 0000 0000"},
+        {"312#04 06 01 FFFF FF", "212#84 01 06 01 FFFF FF"},
+        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01 FFFF FFFF"},
+        {"311#04 04 01 00", "211#84 01 04 01 00"},
+        {NULL, NULL},
+    };
+    make_link();
+    pdcp_link_remove(&x.arb->link, &x.arb->bus, input());
+    exchange_run(&x, removing);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));
+}
+
+/* D-BUS-14: the source is lost: inactive at once, transfer enabled 0, node ids 0 0; 5, 6 and 8 stay. */
+static void test_a_lost_source_is_silenced(void)
+{
+    static const exchange_pair_t silencing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01 00"},
+        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
+        {NULL, NULL},
+    };
+    make_link();
+    exchange_pass(&x, 1000);
+    exchange_rx(&x, "012#0A");
+    exchange_pass(&x, 500);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    exchange_run(&x, silencing);
+    TEST_ASSERT_EQUAL(4, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes)); /* inactive links count */
+}
+
+/* An input that does not answer goes on being told, until it does. */
+static void test_silencing_is_repeated_until_it_is_answered(void)
+{
+    make_link();
+    exchange_pass(&x, 1000);
+    exchange_rx(&x, "012#0A");
+    exchange_pass(&x, 500);
+    for (int i = 0; i < 6; i++) {
+        exchange_tx(&x, "312#04 04 01 00");
+        exchange_silence(&x);
+        exchange_pass(&x, 100);
+    }
+    exchange_rx(&x, "212#84 01 04 01 00");
+    exchange_tx(&x, "312#04 04 01 00"); /* the seventh was on its way */
+    exchange_rx(&x, "212#84 01 04 01 00");
+    exchange_tx(&x, "312#04 07 01 00 00");
+    exchange_rx(&x, "212#84 01 07 01 00 00");
+    exchange_silence(&x);
+    TEST_ASSERT_FALSE(the_input()->enabled);
+}
+
+/* The input's device is lost: its output has nobody to listen and is disabled. */
+static void test_a_lost_input_disables_its_output(void)
+{
+    make_link();
+    exchange_pass(&x, 1000);
+    exchange_rx(&x, "011#0A");
+    exchange_pass(&x, 500);
+    exchange_tx(&x, "311#04 04 01 00");
+    exchange_rx(&x, "211#84 01 04 01 00");
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+}
+
+/* A lost device that comes back binds again and gets its old id and links. */
+static void test_a_returning_source_gets_its_links_back(void)
+{
+    make_link();
+    exchange_pass(&x, 1000);
+    exchange_rx(&x, "012#0A");
+    exchange_pass(&x, 500);
+    exchange_tx(&x, "312#04 04 01 00");
+    exchange_rx(&x, "212#84 01 04 01 00");
+    exchange_tx(&x, "312#04 07 01 00 00");
+    exchange_rx(&x, "212#84 01 07 01 00 00");
+    static const exchange_pair_t pairs[] = {
+        {"311#81 11 0200 0200 0400", NULL},
+        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
+        {"311#03 02 00", "211#83 01 02 00 0400"},
+        {"311#03 06 00", "211#83 00 06 00"},
+        {"311#03 0B 00", "211#83 00 0B 00"},
+        {"311#03 0A 00", "211#83 00 0A 00"},
+        {"311#03 09 00", "211#83 01 09 00 01"},
+        {"311#04 04 01 00", "211#84 01 04 01 00"},
+        {"311#03 03 01", "211#83 01 03 01 02"},
+        {"311#03 01 01", "211#83 01 01 01 0050 2021"},
+        {"311#03 09 01", "211#83 00 09 01"},
+        {"311#03 0A 01", "211#83 00 0A 01"},
+        {"311#04 05 01 FE", "211#84 01 05 01 FE"},
+        /* and at once its link */
+        {"312#04 05 01 0200 0200", "212#84 01 05 01 0200 0200"},
+        {"312#04 06 01 0400 01", "212#84 01 06 01 0400 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
+        {"312#04 07 01 11 FE", "212#84 01 07 01 11 FE"},
+        {"312#04 04 01 01", "212#84 01 04 01 01"},
+        {"311#04 04 01 01", "211#84 01 04 01 01"},
+        {NULL, NULL},
+    };
+    exchange_rx(&x, "611#01 0200 0200 0400");
+    exchange_run(&x, pairs);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+/* D-BUS-14: the source is away for longer than its ids are kept; a stranger that gets them is not heard, and
+ * the link is remembered by identity. */
+static void test_a_link_outlives_the_ids_of_its_source(void)
+{
+    static const exchange_pair_t silencing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01 00"},
+        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
+        {NULL, NULL},
+    };
+    make_link();
+    for (int i = 0; i < 24; i++) {
+        exchange_pass(&x, 500);
+        exchange_rx(&x, "012#0A");
+        if (i == 2) {
+            exchange_run(&x, silencing);
+        }
+        exchange_silence(&x);
+    }
+    TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->feed);
+    exchange_add_output(&x, "FE");
+    exchange_run(&x, making);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+/* pdcp-bus.md 7: the source that 5 and 6 name is bound: linked, and answered success when that is done. */
+static void test_update_data_channel_links(void)
+{
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 01 05 01 0200 0200");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    for (int i = 0; making[i].tx != NULL; i++) {
+        exchange_tx(&x, making[i].tx);
+        exchange_rx(&x, making[i].rx);
+    }
+    exchange_tx(&x, "312#8F 01 01");
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+/* Asked again for a link that is there: success without writing. */
+static void test_update_data_channel_of_an_active_link(void)
+{
+    make_link();
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 01 05 01 0200 0200");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_tx(&x, "312#8F 01 01");
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+/* Not present: remembered as inactive, answered failure, realised when the source appears. */
+static void test_update_data_channel_waits_for_its_source(void)
+{
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 01 05 01 0300 0300");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0900 01");
+    exchange_tx(&x, "312#8F 00 01");
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
+
+    static const exchange_pair_t pairs[] = {
+        {"313#81 13 0300 0300 0900", NULL},
+        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
+        {"313#03 02 00", "213#83 01 02 00 0900"},
+        {"313#03 06 00", "213#83 00 06 00"},
+        {"313#03 0B 00", "213#83 00 0B 00"},
+        {"313#03 0A 00", "213#83 00 0A 00"},
+        {"313#03 09 00", "213#83 01 09 00 01"},
+        {"313#04 04 01 00", "213#84 01 04 01 00"},
+        {"313#03 03 01", "213#83 01 03 01 02"},
+        {"313#03 01 01", "213#83 01 01 01 0050 2021"},
+        {"313#03 09 01", "213#83 00 09 01"},
+        {"313#03 0A 01", "213#83 00 0A 01"},
+        {"313#04 05 01 FD", "213#84 01 05 01 FD"},
+        {"312#04 05 01 0300 0300", "212#84 01 05 01 0300 0300"},
+        {"312#04 06 01 0900 01", "212#84 01 06 01 0900 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
+        {"312#04 07 01 13 FD", "212#84 01 07 01 13 FD"},
+        {"312#04 04 01 01", "212#84 01 04 01 01"},
+        {"313#04 04 01 01", "213#84 01 04 01 01"},
+        {NULL, NULL},
+    };
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_run(&x, pairs);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+}
+
+static void test_update_data_channel_of_what_is_no_input(void)
+{
+    exchange_rx(&x, "211#0F 01"); /* an output */
+    exchange_tx(&x, "311#8F 00 01");
+    exchange_rx(&x, "212#0F 02"); /* does not exist */
+    exchange_tx(&x, "312#8F 00 02");
+    exchange_rx(&x, "212#0F 01"); /* unconnected */
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 01 05 01 FFFF FFFF");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 FFFF FF");
+    exchange_tx(&x, "312#8F 00 01");
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+}
+
+/* 2307h replaces the input's source: the old output is disabled when nobody else listens to it. */
+static void test_a_source_is_replaced(void)
+{
+    static const exchange_pair_t binding[] = {
+        {"313#81 13 0300 0300 0900", NULL},        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
+        {"313#03 02 00", "213#83 01 02 00 0900"},  {"313#03 06 00", "213#83 00 06 00"},
+        {"313#03 0B 00", "213#83 00 0B 00"},       {"313#03 0A 00", "213#83 00 0A 00"},
+        {"313#03 09 00", "213#83 01 09 00 01"},    {"313#04 04 01 00", "213#84 01 04 01 00"},
+        {"313#03 03 01", "213#83 01 03 01 02"},    {"313#03 01 01", "213#83 01 01 01 0050 2021"},
+        {"313#03 09 01", "213#83 00 09 01"},       {"313#03 0A 01", "213#83 00 0A 01"},
+        {"313#04 05 01 FD", "213#84 01 05 01 FD"}, {NULL, NULL},
+    };
+    static const exchange_pair_t replacing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01 00"},
+        {"312#04 05 01 0300 0300", "212#84 01 05 01 0300 0300"},
+        {"312#04 06 01 0900 01", "212#84 01 06 01 0900 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
+        {"312#04 07 01 13 FD", "212#84 01 07 01 13 FD"},
+        {"312#04 04 01 01", "212#84 01 04 01 01"},
+        {"313#04 04 01 01", "213#84 01 04 01 01"},
+        {"311#04 04 01 00", "211#84 01 04 01 00"},
+        {NULL, NULL},
+    };
+    make_link();
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_run(&x, binding);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1), input()));
+    exchange_run(&x, replacing);
+    TEST_ASSERT_EQUAL(9, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
+}
+
+/* The source is lost in the middle of making a link. */
+static void test_a_source_lost_in_the_middle_is_undone(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    for (int i = 0; i < 5; i++) {
+        exchange_tx(&x, making[i].tx);
+        exchange_rx(&x, making[i].rx);
+    }
+    exchange_tx(&x, making[5].tx);
+    exchange_rx(&x, "611#01 0200 0200 0400"); /* it was reset: any try unanswered shows it */
+    exchange_pass(&x, 100);
+    (void)exchange_drain(&x);
+    exchange_pass(&x, 100);
+    (void)exchange_drain(&x);
+    exchange_pass(&x, 100); /* the third try of the enabling write has failed */
+    exchange_tx(&x, "311#81 11 0200 0200 0400");
+    exchange_tx(&x, "311#03 01 00");
+    exchange_tx(&x, undoing[4].tx);
+    exchange_rx(&x, undoing[4].rx);
+    exchange_tx(&x, undoing[3].tx);
+}
+
+/* The host's request to a device and a link job share its one place. */
+static void test_a_link_waits_for_the_hosts_request(void)
+{
+    uint8_t bytes[8];
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_get(x.arb, 1, 0, 8, bytes, sizeof bytes));
+    exchange_tx(&x, "312#03 08 00");
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    exchange_silence(&x);
+    exchange_rx(&x, "212#83 01 08 00 12");
+    TEST_ASSERT_EQUAL(1, exchange_last(&x, PDCP_EVENT_REQUEST)->len);
+    TEST_ASSERT_EQUAL_HEX8(0x12, bytes[0]);
+    exchange_run(&x, making);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_link_is_made_in_order);
+    RUN_TEST(test_the_same_link_again_costs_nothing);
+    RUN_TEST(test_what_cannot_be_a_link);
+    RUN_TEST(test_refused_vid_and_pid_is_undone);
+    RUN_TEST(test_refused_serial_is_undone);
+    RUN_TEST(test_refused_node_ids_are_undone);
+    RUN_TEST(test_refused_input_is_undone);
+    RUN_TEST(test_refused_output_is_undone);
+    RUN_TEST(test_an_input_without_parameter_8_is_linked);
+    RUN_TEST(test_silence_in_the_middle_ends_the_link);
+    RUN_TEST(test_a_lost_answer_is_repeated_and_the_link_made);
+    RUN_TEST(test_a_link_is_removed);
+    RUN_TEST(test_a_lost_source_is_silenced);
+    RUN_TEST(test_silencing_is_repeated_until_it_is_answered);
+    RUN_TEST(test_a_lost_input_disables_its_output);
+    RUN_TEST(test_a_returning_source_gets_its_links_back);
+    RUN_TEST(test_a_link_outlives_the_ids_of_its_source);
+    RUN_TEST(test_update_data_channel_links);
+    RUN_TEST(test_update_data_channel_of_an_active_link);
+    RUN_TEST(test_update_data_channel_waits_for_its_source);
+    RUN_TEST(test_update_data_channel_of_what_is_no_input);
+    RUN_TEST(test_a_source_is_replaced);
+    RUN_TEST(test_a_source_lost_in_the_middle_is_undone);
+    RUN_TEST(test_a_link_waits_for_the_hosts_request);
+    return UNITY_END();
+}

@@ -243,7 +243,7 @@ static const message_t messages[] = {
 
 static const message_t *find_message(uint16_t id)
 {
-    for (uint8_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
+    for (size_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
         if (messages[i].id == id) {
             return &messages[i];
         }

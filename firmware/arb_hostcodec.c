@@ -1,5 +1,7 @@
 #include "arb_hostcodec.h"
 
+#include <stddef.h>
+
 static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 {
     crc ^= byte;
@@ -17,7 +19,7 @@ uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
 {
     static const uint8_t covered[] = {2, 3, 4, 6, 7};
     uint8_t crc = 0;
-    for (uint8_t i = 0; i < sizeof covered; i++) {
+    for (size_t i = 0; i < sizeof covered; i++) {
         crc = crc8_byte(crc, header[covered[i]]);
     }
     return crc;

@@ -75,7 +75,8 @@ static area_state_t check_area(const arb_port_t *port, uint8_t area, uint8_t hea
     }
     /* Over a message and its own CRC-32 the register ends at this residue. */
     uint32_t crc = 0xFFFFFFFFuL;
-    for (uint16_t at = 0; at < body_length(header[3]) + ARB_STORE_CRC; at++) {
+    const uint16_t end = (uint16_t)(body_length(header[3]) + ARB_STORE_CRC);
+    for (uint16_t at = 0; at < end; at++) {
         uint8_t byte;
         if (!port->nvm_read(port->ctx, (uint16_t)(area_address(area) + at), &byte, 1)) {
             return AREA_DAMAGED;
@@ -106,7 +107,7 @@ void arb_store_load(arb_store_t *store, const arb_port_t *port, pdcp_bind_t *bin
     uint8_t best_count = 0;
     memset(store, 0, sizeof *store);
     store->area = ARB_STORE_AREAS;
-    for (uint8_t area = 0; area < ARB_STORE_AREAS; area++) {
+    for (uint8_t area = 0; area < (uint8_t)ARB_STORE_AREAS; area++) {
         uint8_t header[ARB_STORE_HEADER];
         const area_state_t state = check_area(port, area, header);
         if (state == AREA_DAMAGED) {

@@ -132,7 +132,8 @@ static bool is_free(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now
 static uint8_t pick_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms,
                        const pdcp_identity_t *identity)
 {
-    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+    for (uint16_t i = PDCP_NODE_MIN; i <= (uint16_t)PDCP_NODE_MAX; i++) {
+        const uint8_t id = (uint8_t)i;
         if (is_free(bind, bus, now_ms, id, identity) && !is_remembered(bind, id)) {
             return id;
         }

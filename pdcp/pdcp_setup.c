@@ -35,7 +35,7 @@ static const step_t output_steps[] = {
     {PDCP_OUT_NODE_ID, true, true},
 };
 
-#define STEPS(array) ((steps_t){array, (uint8_t)(sizeof array / sizeof array[0])})
+#define STEPS(array) ((steps_t){(array), (uint8_t)(sizeof(array) / sizeof((array)[0]))})
 
 /* Longest values that a setup has use for: a bit string of 256 channels. */
 #define SETUP_VALUE_MAX 32u

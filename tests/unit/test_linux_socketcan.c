@@ -32,8 +32,9 @@ static can_frame_t received[FRAMES_MAX];
 static size_t received_n;
 static size_t room; /* frames taken by one call of hal_can_receive */
 static int ready_calls;
-static int down_calls;  /* of these, with the bus down */
-static unsigned sent_n; /* by send_numbered */
+static int down_calls;      /* of these, with the bus down */
+static int refused_by_down; /* refusals of send_numbered with the bus down */
+static unsigned sent_n;     /* by send_numbered */
 static unsigned to_send;
 
 static void shell(const char *command)
@@ -53,6 +54,7 @@ static void send_numbered(void)
         can_frame_t frame = {
             .id = (uint16_t)(sent_n & 0x7FF), .dlc = 2, .data = {(uint8_t)(sent_n >> 8), (uint8_t)sent_n}};
         if (!hal_can_send(can, &frame)) {
+            refused_by_down += hal_can_health(can).state == HAL_CAN_DOWN ? 1 : 0;
             return;
         }
         sent_n++;
@@ -63,7 +65,6 @@ static void on_ready(void *ctx)
 {
     (void)ctx;
     ready_calls++;
-    down_calls += hal_can_health(can).state == HAL_CAN_DOWN ? 1 : 0;
     size_t n;
     do {
         size_t wanted = room < FRAMES_MAX - received_n ? room : FRAMES_MAX - received_n;
@@ -95,7 +96,7 @@ void setUp(void)
     received_n = 0;
     room = 32;
     ready_calls = 0;
-    down_calls = 0;
+    refused_by_down = 0;
     sent_n = 0;
     to_send = 0;
     peer = open_peer();
@@ -444,7 +445,7 @@ static void expect_all_sent(unsigned n)
         expect_at_peer(i & 0x7FF, 2, data);
     }
     expect_silence_at_peer();
-    TEST_ASSERT_EQUAL_INT(0, down_calls);
+    TEST_ASSERT_EQUAL_INT(0, refused_by_down);
     TEST_ASSERT_EQUAL_UINT32(0, hal_can_health(can).tx_failed);
 }
 

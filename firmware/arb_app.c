@@ -25,6 +25,7 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
 {
     memset(app, 0, sizeof *app);
     app->port = port;
+    app->work = true;
     pdcp_arb_init(&app->arb, now_ms, on_event, app);
     arb_hostapi_init(&app->api);
     app->api.strict = settings->strict_crc;
@@ -39,11 +40,14 @@ void arb_app_observe(arb_app_t *app, arb_observer_t observer, void *ctx)
 
 void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
 {
-    pdcp_arb_on_frame(&app->arb, now_ms, frame);
+    if (pdcp_arb_on_frame(&app->arb, now_ms, frame)) {
+        app->work = true;
+    }
 }
 
 uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len)
 {
+    app->work = true;
     return arb_hostapi_on_bytes(&app->api, now_ms, bytes, len);
 }
 
@@ -63,6 +67,9 @@ static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
 
 uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
 {
+    if (!app->work && pdcp_time_before(now_ms, app->next_ms)) {
+        return app->next_ms;
+    }
     uint32_t next_ms;
     bool again;
     do {
@@ -72,5 +79,7 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
     send_frames(app);
     arb_store_step(&app->store, app->port, &app->arb.bind, now_ms);
     next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
-    return earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
+    app->next_ms = earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
+    app->work = pdcp_arb_tx_peek(&app->arb) != NULL || arb_hostapi_has_output(&app->api);
+    return app->next_ms;
 }

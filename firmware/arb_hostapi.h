@@ -72,6 +72,12 @@ void arb_hostapi_on_event(arb_hostapi_t *api, const pdcp_event_t *event);
  * to do. */
 bool arb_hostapi_step(arb_hostapi_t *api, pdcp_arb_t *arb, const arb_port_t *port, uint32_t now_ms);
 
+/* Do answers wait for room at the host? */
+static inline bool arb_hostapi_has_output(const arb_hostapi_t *api)
+{
+    return api->answer_len != 0 || api->urgent_len != 0;
+}
+
 /* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when nothing depends on time. */
 uint32_t arb_hostapi_next_ms(const arb_hostapi_t *api, uint32_t now_ms);
 

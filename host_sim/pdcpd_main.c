@@ -9,7 +9,6 @@
 #include <string.h>
 
 #include "arb_app.h"
-#include "hal_clock.h"
 #include "linux_can.h"
 #include "linux_nvm.h"
 #include "linux_uart.h"

@@ -214,17 +214,20 @@ static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
     }
 }
 
-static void on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+/* True: it was the first one, or the device was lost. */
+static bool on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
+    if (device->beaconed && device->state != PDCP_NODE_LOST) {
+        return false;
+    }
     if (device->state == PDCP_NODE_LOST) {
         begin_setup(arb, now_ms, node); /* reads who it is before anything else (D-BUS-15) */
         serve(arb, now_ms, node);
     }
-    if (!device->beaconed) {
-        device->beaconed = true;
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_BOUND, node, PDCP_NONE, PDCP_OK);
-    }
+    device->beaconed = true;
+    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_BOUND, node, PDCP_NONE, PDCP_OK);
+    return true;
 }
 
 static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
@@ -301,7 +304,7 @@ static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can
     } else if (is_deprecated(msg.code)) {
         count(arb, PDCP_STAT_DROP_DEPRECATED);
     } else if (msg.code == PDCP_BEACON) {
-        on_beacon(arb, now_ms, node);
+        (void)on_beacon(arb, now_ms, node);
     } else if (!is_from_device(msg.code)) {
         count(arb, PDCP_STAT_DROP_DIRECTION);
     } else if (msg.code == PDCP_UPDATE_CHANNEL) {
@@ -312,37 +315,37 @@ static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can
     }
 }
 
-void pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
 {
     count(arb, PDCP_STAT_RX);
     if (frame->kind != CAN_FRAME_BASE) {
         on_other_kind(arb, frame);
-        return;
+        return false;
     }
     if (pdcp_id_from_arbitrator(frame->id)) {
         on_arbitrator_frame(arb, frame);
-        return;
+        return false;
     }
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         on_bind_frame(arb, now_ms, frame);
-        return;
+        return true;
     }
     uint8_t node;
     const bool is_device = pdcp_nodes_owner(&arb->bus.nodes, pdcp_id_node(frame->id), &node);
     if (node >= PDCP_DEVICES_MAX) {
         on_stranger(arb, now_ms, frame);
-        return;
+        return true;
     }
     node_of(arb, node)->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     if (!is_device) {
         count(arb, PDCP_STAT_CHANNEL_DATA);
-        return;
+        return false;
     }
     if (frame->dlc == 1 && frame->data[0] == PDCP_BEACON) {
-        on_beacon(arb, now_ms, node); /* by far the most frequent: without decoding */
-        return;
+        return on_beacon(arb, now_ms, node); /* by far the most frequent: without decoding */
     }
     on_message(arb, now_ms, node, frame);
+    return true;
 }
 
 static void send_beacon(pdcp_arb_t *arb, uint32_t now_ms)

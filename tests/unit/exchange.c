@@ -78,7 +78,11 @@ void exchange_step(exchange_t *x)
 void exchange_rx(exchange_t *x, const char *text)
 {
     const can_frame_t frame = exchange_frame(text);
-    pdcp_arb_on_frame(x->arb, x->now_ms, &frame);
+    if (x->app != NULL) {
+        arb_app_on_frame(x->app, x->now_ms, &frame);
+    } else {
+        (void)pdcp_arb_on_frame(x->arb, x->now_ms, &frame);
+    }
     exchange_step(x);
 }
 

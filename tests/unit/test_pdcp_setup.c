@@ -271,7 +271,7 @@ static void test_other_kinds_of_frames_are_counted(void)
     for (unsigned i = 0; i < sizeof kinds / sizeof kinds[0]; i++) {
         can_frame_t frame = exchange_frame("611#01 0200 0200 0400");
         frame.kind = (uint8_t)kinds[i].kind;
-        pdcp_arb_on_frame(x.arb, x.now_ms, &frame);
+        TEST_ASSERT_FALSE(pdcp_arb_on_frame(x.arb, x.now_ms, &frame));
         exchange_silence(&x);
         TEST_ASSERT_EQUAL(1, stat_of(kinds[i].stat));
     }

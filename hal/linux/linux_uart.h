@@ -1,7 +1,11 @@
 /* Opening the host's byte stream on Linux. What can be done with it then stands in hal_uart.h.
  *
  * PORT is pty or pty:LINKPATH, a new pseudo-terminal in raw mode; with LINKPATH a symbolic link to it is
- * made, replacing a stale one, and removed at the end. A path that is no symbolic link is never replaced. */
+ * made, replacing a stale one, and removed at the end. A path that is no symbolic link is never replaced.
+ *
+ * When the last host closes its end, what it has not read is thrown away and the end is put back into raw
+ * mode. A host that reopens before the loop has come round may still find bytes that were meant for the one
+ * before. */
 #ifndef LINUX_UART_H
 #define LINUX_UART_H
 

@@ -34,8 +34,9 @@ uint64_t loop_now_us(const loop_t *loop);
 /* Reads the clock again, for a handler that has worked for long. */
 uint64_t loop_refresh_now_us(loop_t *loop);
 
-/* loop_run_once returns at the latest at this time (loop_now_us clock). Replaces the time set before. Setting
- * a later time than the timer is armed for costs no system call: the loop then wakes once for nothing. */
+/* loop_run_once returns at the latest at this time (loop_now_us clock); UINT64_MAX: no limit. Replaces the
+ * time set before and stays until replaced: with a time that is past the loop does not sleep. Setting a later
+ * time than the timer is armed for costs no system call: the loop then wakes once for nothing. */
 void loop_set_deadline_us(loop_t *loop, uint64_t deadline_us);
 
 /* Sleeps until a descriptor is ready, the deadline is reached or a signal came, and runs the handlers. False:

@@ -32,7 +32,6 @@ static can_frame_t received[FRAMES_MAX];
 static size_t received_n;
 static size_t room; /* frames taken by one call of hal_can_receive */
 static int ready_calls;
-static int down_calls;      /* of these, with the bus down */
 static int refused_by_down; /* refusals of send_numbered with the bus down */
 static unsigned sent_n;     /* by send_numbered */
 static unsigned to_send;

@@ -24,8 +24,8 @@ typedef struct {
     arb_hostapi_t api;
     arb_store_t store;
     const arb_port_t *port;
-    bool work;        /* something was handed in, or frames or bytes wait for room */
-    uint32_t next_ms; /* what arb_app_step returned last */
+    bool work;               /* something was handed in, or frames or bytes wait for room */
+    uint32_t next_ms;        /* what arb_app_step returned last */
     arb_observer_t observer; /* NULL: nobody */
     void *observer_ctx;
 } arb_app_t;
@@ -43,7 +43,8 @@ void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
 /* Bytes from the host. Returns how many were taken; the rest is offered again after the next step. */
 uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len);
 
-/* Does everything that is due; costs next to nothing when there is nothing to do. Returns the absolute time of the next call at the latest. */
+/* Does everything that is due; costs next to nothing when there is nothing to do. Returns the absolute time
+ * of the next call at the latest. */
 uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms);
 
 #endif

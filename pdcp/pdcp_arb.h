@@ -51,9 +51,9 @@ typedef struct {
 /* on_event: see pdcp_bus.h. The first beacon is due at once. */
 void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, pdcp_event_fn on_event, void *ctx);
 
-/* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. True: it may have led to
- * something, pdcp_arb_step is to be called. False: nothing is due earlier than before; so it is with the most frequent
- * frames, beacons and channel data. */
+/* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. True:
+ * it may have led to something, pdcp_arb_step is to be called. False: nothing is due earlier than before; so
+ * it is with the most frequent frames, beacons and channel data. */
 bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame);
 
 /* Does what is due. Returns the absolute time at which it is to be called again at the latest. */

@@ -18,7 +18,7 @@ static char error[200];
 
 void setUp(void)
 {
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    memset(folder + strlen(folder) - 6, 'X', 6);
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     snprintf(path, sizeof path, "%s/nvm", folder);
     error[0] = '\0';
@@ -48,7 +48,9 @@ static void expect_file(size_t address, const char *text)
     uint8_t bytes[HAL_NVM_SIZE + 1];
     uint8_t expected[HAL_NVM_SIZE];
     memset(expected, 0xFF, sizeof expected);
-    memcpy(expected + address, text, strlen(text));
+    for (size_t i = 0; text[i] != '\0'; i++) {
+        expected[address + i] = (uint8_t)text[i];
+    }
     int fd = open(path, O_RDONLY);
     TEST_ASSERT_EQUAL_INT(HAL_NVM_SIZE, read(fd, bytes, sizeof bytes));
     close(fd);

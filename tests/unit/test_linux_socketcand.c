@@ -64,7 +64,7 @@ static void listen_at(uint16_t port)
 
 static uint16_t listener_port(void)
 {
-    struct sockaddr_in address;
+    struct sockaddr_in address = {.sin_port = 0};
     socklen_t size = sizeof address;
     TEST_ASSERT_EQUAL_INT(0, getsockname(listener, (struct sockaddr *)&address, &size));
     return ntohs(address.sin_port);
@@ -391,7 +391,7 @@ static unsigned read_numbered(char *rest, size_t rest_size, unsigned number)
         number++;
     }
     TEST_ASSERT_LESS_THAN_UINT(rest_size, strlen(at));
-    strcpy(rest, at);
+    snprintf(rest, rest_size, "%s", at);
     return number;
 }
 
@@ -481,7 +481,7 @@ static size_t count_attempts(uint64_t time_us, uint64_t *times_us, size_t max)
 
 static void test_attempts_back_off(void)
 {
-    uint64_t times_us[20];
+    uint64_t times_us[20] = {0};
     open_can();
     lose_connection();
     /* 100 ms after the loss, then 200, 400, 800: at 100, 300, 700, 1500 ms, and not again before 3100 ms. */

@@ -44,7 +44,7 @@ static void open_uart(const char *port)
 
 void setUp(void)
 {
-    strcpy(folder + strlen(folder) - 6, "XXXXXX");
+    memset(folder + strlen(folder) - 6, 'X', 6);
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     snprintf(link_path, sizeof link_path, "%s/pty", folder);
     loop = loop_create();

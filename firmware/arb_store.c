@@ -150,7 +150,11 @@ static bool write_page(arb_store_t *store, const arb_port_t *port, const pdcp_bi
     uint16_t len = 0;
     while (len < ARB_PORT_NVM_PAGE && store->written + len < body + ARB_STORE_CRC) {
         const uint16_t at = (uint16_t)(store->written + len);
-        page[len] = at < body ? body_byte(bind, sequence, at) : (uint8_t)((crc >> (8 * (at - body))) & 0xFFu);
+        if (at < body) {
+            page[len] = body_byte(bind, sequence, at);
+        } else {
+            page[len] = (uint8_t)((crc >> (8u * (uint16_t)(at - body))) & 0xFFu);
+        }
         len++;
     }
     const uint16_t address = (uint16_t)(area_address(next_area(store)) + store->written);

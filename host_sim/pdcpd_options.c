@@ -55,6 +55,9 @@ static error_t on_option(int key, char *text, struct argp_state *state)
 {
     pdcpd_options_t *options = state->input;
     switch (key) {
+    case ARGP_KEY_INIT:
+        state->err_stream = NULL; /* one line, getopt's, and no hint behind it */
+        return 0;
     case 'c':
         replace(&options->can, text);
         return 0;
@@ -69,7 +72,7 @@ static error_t on_option(int key, char *text, struct argp_state *state)
         return 0;
     case 'd':
         if (!add_node(options, text)) {
-            argp_failure(state, PDCPD_EXIT_USAGE, 0, "--node: more than %d devices", PDCPD_NODES_MAX);
+            argp_failure(NULL, PDCPD_EXIT_USAGE, 0, "--node: more than %d devices", PDCPD_NODES_MAX);
         }
         return 0;
     case KEY_NO_AUTOCONFIG:
@@ -80,12 +83,12 @@ static error_t on_option(int key, char *text, struct argp_state *state)
         return 0;
     case 'l':
         if (!parse_level(text, &options->log)) {
-            argp_failure(state, PDCPD_EXIT_USAGE, 0, "--log: '%s' is not one of error, warning, info, debug",
+            argp_failure(NULL, PDCPD_EXIT_USAGE, 0, "--log: '%s' is not one of error, warning, info, debug",
                          text);
         }
         return 0;
     case ARGP_KEY_ARG:
-        argp_failure(state, PDCPD_EXIT_USAGE, 0, "unexpected argument '%s'; --help tells more", text);
+        argp_failure(NULL, PDCPD_EXIT_USAGE, 0, "unexpected argument '%s'; --help tells more", text);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;
@@ -204,8 +207,9 @@ void pdcpd_options_parse(pdcpd_options_t *options, int argc, char **argv)
     memset(options, 0, sizeof *options);
     const pdcpd_log_t not_given = (pdcpd_log_t)(PDCPD_LOG_DEBUG + 1);
     options->log = not_given;
-    argp_err_exit_status = PDCPD_EXIT_USAGE;
-    (void)argp_parse(&parser, argc, argv, 0, NULL, options);
+    if (argp_parse(&parser, argc, argv, 0, NULL, options) != 0) {
+        exit(PDCPD_EXIT_USAGE);
+    }
     const bool log_given = options->log != not_given;
     if (!log_given) {
         options->log = PDCPD_LOG_WARNING;

@@ -40,6 +40,15 @@ static void set_life(pdcp_arb_t *arb, uint8_t node, uint32_t deadline_ms)
     pdcp_timers_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_LIFE + node), deadline_ms);
 }
 
+/* The beacon interval of a device may have become shorter: the deadline moves by itself only when it fires.
+ */
+static void expect_life(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    if (node_of(arb, node)->state != PDCP_NODE_LOST) {
+        set_life(arb, node, now_ms + silence_ms(node_of(arb, node)));
+    }
+}
+
 static void host_ends(pdcp_arb_t *arb, uint32_t now_ms, pdcp_status_t status)
 {
     arb->host.active = false;
@@ -72,7 +81,7 @@ static void begin_setup(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
     device->setup_attempts = 0;
     device->heard_ms = now_ms;
     pdcp_setup_start(&arb->bus, node);
-    set_life(arb, node, now_ms + silence_ms(device));
+    expect_life(arb, now_ms, node);
 }
 
 static void tell_lost(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
@@ -237,6 +246,11 @@ static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
         host->len = (uint16_t)(reply->offset + reply->len);
     }
+    if (host->set && reply->done && reply->status == PDCP_OK && host->channel == 0) {
+        pdcp_setup_take_time(node_of(arb, host->node), host->param, host->bytes,
+                             (uint8_t)(host->size < PDCP_VALUE_MAX ? host->size : PDCP_VALUE_MAX));
+        expect_life(arb, now_ms, host->node);
+    }
     if (reply->done) {
         host_ends(arb, now_ms, (pdcp_status_t)reply->status);
     }
@@ -263,6 +277,9 @@ static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_
     switch ((pdcp_client_t)reply->client) {
     case PDCP_CLIENT_SETUP:
         pdcp_setup_on_reply(&arb->bus, now_ms, node, reply);
+        if (reply->channel == 0 && reply->param == PDCP_DEV_BEACON_INTERVAL) {
+            expect_life(arb, now_ms, node);
+        }
         if (reply->done && node_of(arb, node)->state == PDCP_NODE_READY) {
             pdcp_link_on_ready(&arb->link, &arb->bus, node);
         }

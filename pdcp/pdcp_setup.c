@@ -169,6 +169,16 @@ static uint16_t clamp(uint16_t value, uint16_t low, uint16_t high)
     return value > high ? high : value;
 }
 
+void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, const uint8_t *value, uint8_t len)
+{
+    const uint16_t time_ms = pdcp_value_u16(value, len, 0);
+    if (param == PDCP_DEV_ACK_TIME) {
+        device->ack_ms = clamp(time_ms, PDCP_ACK_MIN_MS, PDCP_ACK_MAX_MS);
+    } else if (param == PDCP_DEV_BEACON_INTERVAL) {
+        device->beacon_ms = clamp(time_ms, PDCP_BEACON_MIN_MS, PDCP_BEACON_MAX_MS);
+    }
+}
+
 /* Takes over a device parameter. False: it does not fit, the attempt has failed. */
 static bool take_device(pdcp_bus_t *bus, uint8_t node, uint8_t param, const uint8_t *value, uint8_t len)
 {
@@ -185,10 +195,8 @@ static bool take_device(pdcp_bus_t *bus, uint8_t node, uint8_t param, const uint
         device->profile = high;
         return true;
     case PDCP_DEV_ACK_TIME:
-        device->ack_ms = clamp(low, PDCP_ACK_MIN_MS, PDCP_ACK_MAX_MS);
-        return true;
     case PDCP_DEV_BEACON_INTERVAL:
-        device->beacon_ms = clamp(low, PDCP_BEACON_MIN_MS, PDCP_BEACON_MAX_MS);
+        pdcp_setup_take_time(device, param, value, len);
         return true;
     default: /* PDCP_DEV_CHANNELS */
         if (!pdcp_nodes_set_channels(&bus->nodes, node, pdcp_value_u8(value, len, 0))) {

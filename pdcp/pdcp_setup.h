@@ -19,6 +19,10 @@ void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node);
  * request under way. */
 void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node);
 
+/* Takes over a device's acknowledgement time (parameter 11) or beacon interval (10), as read, or as written
+ * by the host (D-BUS-25), within the limits of D-BUS-13. Other parameters: nothing. */
+void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, const uint8_t *value, uint8_t len);
+
 /* A reply to a request of PDCP_CLIENT_SETUP. When an attempt has failed, the timer of the device's requests
  * runs until the next one is to be started. */
 void pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply);

@@ -361,6 +361,38 @@ static void test_a_device_is_lost_and_later_forgotten(void)
     TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0xFE]);
 }
 
+/* A device with a beacon interval of 100 ms that stops right after its binding: gone after 300 ms, not 1500. */
+static void test_a_short_beacon_interval_counts_at_once(void)
+{
+    static const exchange_pair_t pairs[] = {
+        {"311#03 01 00", "211#83 01 01 00 0200 0200"}, {"311#03 02 00", "211#83 01 02 00 0500"},
+        {"311#03 06 00", "211#83 00 06 00"},           {"311#03 0B 00", "211#83 00 0B 00"},
+        {"311#03 0A 00", "211#83 01 0A 00 6400"},      {"311#03 09 00", "211#83 01 09 00 00"},
+        {NULL, NULL},
+    };
+    bind_device();
+    exchange_run(&x, pairs);
+    exchange_rx(&x, "011#0A");
+    exchange_pass(&x, 299);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LOST));
+    exchange_pass(&x, 1);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LOST));
+}
+
+/* D-BUS-25: the host makes a device slower; it is not lost for that. */
+static void test_a_beacon_interval_written_by_the_host_counts(void)
+{
+    uint8_t value[] = {0xE8, 0x03};
+    exchange_add_output(&x, "FE");
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_set(x.arb, 0, 0, 10, value, sizeof value));
+    exchange_tx(&x, "311#04 0A 00 E803");
+    exchange_rx(&x, "211#84 01 0A 00 E803");
+    exchange_pass(&x, 2999);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LOST));
+    exchange_pass(&x, 1);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LOST));
+}
+
 /* Any frame from it counts as life, channel data as well. */
 static void test_channel_data_counts_as_life(void)
 {
@@ -463,6 +495,8 @@ int main(void)
     RUN_TEST(test_required_channels_by_bulk);
     RUN_TEST(test_more_channels_than_there_is_room_for);
     RUN_TEST(test_a_device_is_lost_and_later_forgotten);
+    RUN_TEST(test_a_short_beacon_interval_counts_at_once);
+    RUN_TEST(test_a_beacon_interval_written_by_the_host_counts);
     RUN_TEST(test_channel_data_counts_as_life);
     RUN_TEST(test_a_stranger_is_told_to_reset);
     RUN_TEST(test_a_lost_device_that_beacons_is_taken_back);

@@ -1,0 +1,223 @@
+"""Devices as processes of their own on the simulated bus: links, values, loss and return."""
+
+import threading
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from queue import Empty
+
+import can
+import pytest
+from hostapi import LINK_ACTIVE, LINK_INACTIVE, Channel, FailureError, Host, Identity
+from programs import Pdcpd, Program, Value, until
+
+IDENTITIES = {"d1": Identity(2, 2, 4), "d2": Identity(2, 2, 5), "d3": Identity(2, 2, 6)}
+D1, D2, D3 = IDENTITIES.values()
+LINKS = {(Channel(D1, 1), Channel(D2, 2)), (Channel(D2, 3), Channel(D3, 1)), (Channel(D2, 5), Channel(D3, 2))}
+BEACON_MS = 100
+NODE_ID = 8  # parameter of a device
+
+Start = Callable[..., Pdcpd]
+StartNode = Callable[..., Program]
+
+
+class Candump(threading.Thread):
+    """Keeps every frame on the bus, to be printed when a test fails."""
+
+    def __init__(self, port: int) -> None:
+        super().__init__(daemon=True)
+        self.lines: list[str] = []
+        self._ends = False
+        self._bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="any")
+        self.start()
+
+    def run(self) -> None:
+        while not self._ends:
+            message = self._bus.recv(0.05)
+            # Channel data would hide everything else.
+            if message is not None and (message.arbitration_id >= 0x100 or bytes(message.data) == b"\x0a"):
+                self.lines.append(
+                    f"({message.timestamp:.6f}) can0 {message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
+                )
+
+    def close(self) -> None:
+        self._ends = True
+        self.join()
+        self._bus.shutdown()
+        print("\n".join(self.lines))
+
+
+class Limb:
+    """pdcpd, three processes with one device each, and a host."""
+
+    def __init__(self, pdcpd: Pdcpd, files: dict[str, Path], start_node: StartNode, host: Host) -> None:
+        self.pdcpd = pdcpd
+        self.host = host
+        self._files = files
+        self._start_node = start_node
+        self.nodes: dict[str, Program] = {}
+        for name, path in files.items():
+            text = path.read_text(encoding="utf-8").replace("[device]\n", f"[device]\nbeacon_ms = {BEACON_MS}\n")
+            path.write_text(text, encoding="utf-8")
+            self.start(name)
+
+    def start(self, name: str) -> None:
+        self.nodes[name] = self._start_node(self.pdcpd, self._files[name])
+
+    def forget_asked_id(self, name: str) -> None:
+        """From its next start on the device asks for a random id."""
+        lines = self._files[name].read_text(encoding="utf-8").splitlines(keepends=True)
+        self._files[name].write_text("".join(line for line in lines if "node_id" not in line), encoding="utf-8")
+
+    def is_whole(self) -> bool:
+        return self.host.system_info()[:3] == (3, 4, 4)
+
+    def make_links(self) -> None:
+        until(self.is_whole, "three devices with four inputs and four outputs")
+        for output, input_ in LINKS:
+            assert self.host.configure_link(output, input_) == LINK_ACTIVE
+
+    def links(self) -> dict[tuple[Channel, Channel], int]:
+        return {(link.output, link.input): link.status for link in self.host.links()}
+
+    def is_linked(self) -> bool:
+        return self.links() == dict.fromkeys(LINKS, LINK_ACTIVE)
+
+    def names(self) -> set[Identity]:
+        return {info.channel.device for info in self.host.devices()}
+
+    def arriving(self, count: int) -> list[Value]:
+        """The next values at D3, without safe ones, until both inputs have had so many."""
+        queue = self.nodes["d3"].values
+        while not queue.empty():
+            queue.get()
+        values: list[Value] = []
+        counts = {1: 0, 2: 0}
+        deadline = time.monotonic() + 5
+        while min(counts.values()) < count:
+            try:
+                value = queue.get(timeout=max(0.0, deadline - time.monotonic()))
+            except Empty:
+                pytest.fail(f"of {count} values only {counts} arrived at the two inputs of D3")
+            if not value.safe:
+                values.append(value)
+                counts[value.channel] += 1
+        return values
+
+
+@pytest.fixture
+def limb(
+    start: Start,
+    start_node: StartNode,
+    connect: Callable[[Pdcpd], Host],
+    files: dict[str, Path],
+    stack: ExitStack,
+) -> Limb:
+    pdcpd = start("--can", "sim:0")
+    log = Candump(pdcpd.bus_port())
+    stack.callback(log.close)
+    return Limb(pdcpd, files, start_node, connect(pdcpd))
+
+
+def test_values_arrive(limb: Limb) -> None:
+    """The three devices, each a process, bound with the ids they ask for, linked, and the sine goes all the way."""
+    limb.make_links()
+    assert [limb.host.get_parameter(Channel(each, 0), NODE_ID) for each in (D1, D2, D3)] == [b"\x10", b"\x20", b"\x30"]
+    assert limb.is_linked()
+    values = limb.arriving(60)  # 1.2 s of 2: more than a half turn
+    wrist = [value.value for value in values if value.channel == 1 and value.value is not None]
+    assert {value.device for value in values} == {"0002:0002:0006"}
+    assert min(wrist) >= 0 and max(wrist) <= 255 and max(wrist) - min(wrist) > 100
+    assert all(abs(a - b) <= 20 for a, b in zip(wrist, wrist[1:], strict=False)), f"no sine: {wrist}"
+    grip = {value.value for value in values if value.channel == 2}
+    assert grip == {0, 1}
+
+
+@pytest.mark.parametrize("name", ["d1", "d2", "d3"])
+def test_a_device_is_lost_and_comes_back(limb: Limb, name: str) -> None:
+    """D-BUS-6, D-BUS-14: its links are inactive while it is away; it gets its old id and its links back."""
+    limb.make_links()
+    limb.arriving(3)
+    lost = IDENTITIES[name]
+    old_id = limb.host.get_parameter(Channel(lost, 0), NODE_ID)
+    limb.nodes[name].kill()
+    until(lambda: limb.names() == set(IDENTITIES.values()) - {lost}, "only the other two devices are there")
+    hit = {link for link in LINKS if lost in (link[0].device, link[1].device)}
+    expected = {link: LINK_INACTIVE if link in hit else LINK_ACTIVE for link in LINKS}
+    until(lambda: limb.links() == expected, f"links are {expected}", 2)
+    with pytest.raises(FailureError) as error:
+        limb.host.get_parameter(Channel(lost, 0), NODE_ID)
+    assert error.value.code == 0x03
+    limb.forget_asked_id(name)
+    limb.start(name)
+    until(limb.is_linked, "all links are active again")
+    assert limb.host.get_parameter(Channel(lost, 0), NODE_ID) == old_id
+    limb.arriving(3)
+
+
+@pytest.mark.parametrize("name", ["d1", "d2", "d3"])
+def test_a_device_restarts_before_it_is_missed(limb: Limb, name: str) -> None:
+    """D-BUS-6: the identity of a bound device asks again, silence at its id says that it was reset: set up afresh."""
+    limb.make_links()
+    limb.arriving(3)
+    old_id = limb.host.get_parameter(Channel(IDENTITIES[name], 0), NODE_ID)
+    limb.nodes[name].kill()
+    limb.forget_asked_id(name)
+    limb.start(name)
+    until(lambda: limb.is_whole() and limb.is_linked(), "all links are active again")
+    limb.arriving(3)
+    assert limb.host.get_parameter(Channel(IDENTITIES[name], 0), NODE_ID) == old_id
+
+
+def test_a_sensor_is_away_for_longer_than_its_ids_are_kept(limb: Limb) -> None:
+    """D-BUS-6, D-BUS-14: after the 10 s the identity still gets its old id, and the input still knows its source."""
+    limb.make_links()
+    old_id = limb.host.get_parameter(Channel(D1, 0), NODE_ID)
+    limb.nodes["d1"].kill()
+    until(lambda: limb.names() == {D2, D3}, "the sensor is gone")
+    later_s = time.monotonic() + 10.5
+    until(lambda: time.monotonic() > later_s, "10.5 s have passed", 12)
+    assert limb.links()[(Channel(D1, 1), Channel(D2, 2))] == LINK_INACTIVE
+    limb.forget_asked_id("d1")
+    limb.start("d1")
+    until(limb.is_linked, "all links are active again")
+    assert limb.host.get_parameter(Channel(D1, 0), NODE_ID) == old_id
+    limb.arriving(3)
+
+
+def test_hand_goes_to_its_safe_value(limb: Limb) -> None:
+    """pdcp-bus.md 9, D-BUS-14: the inputs that a lost output fed are disabled, which makes a terminal input safe."""
+    limb.make_links()
+    limb.arriving(3)
+    limb.nodes["d2"].kill()
+    safe: set[int] = set()
+
+    def is_safe() -> bool:
+        while not limb.nodes["d3"].values.empty():
+            value = limb.nodes["d3"].values.get()
+            if value.safe:
+                assert value.value == 0
+                safe.add(value.channel)
+        return safe == {1, 2}
+
+    until(is_safe, "both inputs of the hand are safe", 3)
+
+
+def test_identities_keep_their_ids(
+    start: Start, connect: Callable[[Pdcpd], Host], files: dict[str, Path], tmp_path: Path
+) -> None:
+    """D-BUS-6: the table of identities outlives a restart; the devices ask for random ids each time."""
+    nvm = tmp_path / "nvm"
+    for path in files.values():
+        text = path.read_text(encoding="utf-8")
+        path.write_text("".join(line for line in text.splitlines(True) if "node_id" not in line), encoding="utf-8")
+    found = []
+    for _ in range(3):
+        pdcpd = start("--nvm", nvm, *(word for path in files.values() for word in ("--node", path)))
+        host = connect(pdcpd)
+        until(lambda host=host: host.system_info()[:3] == (3, 4, 4), "three devices are set up")  # type: ignore[misc]
+        found.append([host.get_parameter(Channel(each, 0), NODE_ID) for each in (D1, D2, D3)])
+        until(lambda: nvm.read_bytes().count(0xFF) < nvm.stat().st_size - 20, "the table is stored")
+        assert pdcpd.stop() == 0
+    assert found == [found[0]] * 3

@@ -1,0 +1,245 @@
+"""pdcpd and pdcp-node as programs: how they begin, complain and end."""
+
+import socket
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hostapi import Channel, Host, Identity
+from programs import Pdcpd, until
+
+Start = Callable[..., Pdcpd]
+Connect = Callable[[Pdcpd], Host]
+Run = Callable[..., tuple[int, list[str]]]
+
+NVM_SIZE = 32768
+
+
+@pytest.fixture
+def run(programs: Path) -> Run:
+    """run(PROGRAM, ARGUMENT...): exit status and the lines of standard error of a program that ends by itself."""
+
+    def run_program(name: str, *arguments: str | Path) -> tuple[int, list[str]]:
+        result = subprocess.run(
+            [programs / name, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=10
+        )
+        assert result.stdout == ""
+        return result.returncode, result.stderr.splitlines()
+
+    return run_program
+
+
+def assert_one_line(result: tuple[int, list[str]], *parts: str) -> None:
+    """Exit status 2, and one line that has all the parts."""
+    status, lines = result
+    assert status == 2, lines
+    assert len(lines) == 1, lines
+    for part in parts:
+        assert part in lines[0]
+
+
+# --- wrong use ---
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["--host", "pty"], ["--can"]),
+        (["--can", "sim"], ["--host"]),
+        (["--can", "sim", "--host", "pty", "--nonsense"], ["--nonsense"]),
+        (["--can", "sim", "--host", "pty", "-x"], ["x"]),
+        (["--can", "sim", "--host", "pty", "--can"], ["--can"]),
+        (["--can", "sim", "--host", "pty", "nonsense"], ["nonsense"]),
+        (["--can", "sim", "--host", "pty", "--log", "loud"], ["loud"]),
+        (["--can", "nonsense", "--host", "pty"], ["nonsense"]),
+        (["--can", "sim:x", "--host", "pty"], ["sim:x"]),
+        (["--can", "sim:65536", "--host", "pty"], ["65536"]),
+        (["--can", "sim:", "--host", "pty"], ["sim:"]),
+        (["--can", "sim", "--host", "nonsense"], ["nonsense"]),
+        (["--can", "sim", "--host", "pty:/nosuch/folder/link"], ["/nosuch/folder/link"]),
+        (["--can", "socketcan:nosuch0", "--host", "pty"], ["nosuch0"]),
+        (["--can", "socketcand:127.0.0.1", "--host", "pty"], ["127.0.0.1"]),
+        (["--can", "sim", "--host", "pty", "--node", "/nosuch.ini"], ["/nosuch.ini"]),
+        (["--can", "socketcan:nosuch0", "--host", "pty", "--node", "d1.ini"], ["--node", "sim"]),
+        (["--can", "sim", "--host", "pty", "--nvm", "/nosuch/file"], ["/nosuch/file"]),
+        (["--can", "sim", "--host", "pty", "--config", "/nosuch.ini"], ["/nosuch.ini"]),
+    ],
+)
+def test_pdcpd_wrong_use(arguments: list[str], parts: list[str], run: Run) -> None:
+    assert_one_line(run("pdcpd", *arguments), "pdcpd: ", *parts)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "parts"),
+    [
+        (["/nosuch.ini"], ["--can"]),
+        (["--can", "socketcan:nosuch0"], ["FILE"]),
+        (["--can", "socketcan:nosuch0", "/nosuch.ini"], ["/nosuch.ini"]),
+        (["--can", "sim", "D1"], ["D1"]),
+        (["--nonsense"], ["--nonsense"]),
+    ],
+)
+def test_pdcp_node_wrong_use(arguments: list[str], parts: list[str], run: Run) -> None:
+    assert_one_line(run("pdcp-node", *arguments), "pdcp-node: ", *parts)
+
+
+def test_missing_interface(run: Run, files: dict[str, Path]) -> None:
+    """In an environment without CAN the line says so."""
+    status, lines = run("pdcp-node", "--can", "socketcan:nosuch0", files["d1"])
+    assert_one_line((status, lines), "socketcan:nosuch0")
+    try:
+        socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
+    except OSError:
+        assert "kernel" in lines[0] or "CAN" in lines[0].replace("socketcan", "")
+
+
+def test_a_bad_description(run: Run, tmp_path: Path) -> None:
+    """The line names file and line."""
+    bad = tmp_path / "bad.ini"
+    bad.write_text("[device]\nvid = 2\npid = two\n", encoding="utf-8")
+    assert_one_line(run("pdcpd", "--can", "sim", "--host", "pty", "--node", bad), f"{bad}:3: ")
+
+
+def test_an_occupied_tcp_port(run: Run) -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+        assert_one_line(run("pdcpd", "--can", f"sim:{port}", "--host", "pty"), str(port))
+
+
+def test_a_regular_file_is_no_link(run: Run, tmp_path: Path) -> None:
+    """It is refused, and left alone."""
+    file = tmp_path / "precious"
+    file.write_text("precious", encoding="utf-8")
+    assert_one_line(run("pdcpd", "--can", "sim", "--host", f"pty:{file}"), str(file))
+    assert file.read_text(encoding="utf-8") == "precious"
+
+
+@pytest.mark.parametrize("size", [1, NVM_SIZE - 1, NVM_SIZE + 1, 100000])
+def test_nvm_of_another_size(size: int, run: Run, tmp_path: Path) -> None:
+    """It is refused, and left alone."""
+    nvm = tmp_path / "nvm"
+    nvm.write_bytes(b"\x55" * size)
+    assert_one_line(run("pdcpd", "--can", "sim", "--host", "pty", "--nvm", nvm), str(nvm))
+    assert nvm.read_bytes() == b"\x55" * size
+
+
+def test_nvm_is_a_folder(run: Run, tmp_path: Path) -> None:
+    assert_one_line(run("pdcpd", "--can", "sim", "--host", "pty", "--nvm", tmp_path), str(tmp_path))
+
+
+def test_nvm_in_use(start: Start, run: Run, tmp_path: Path) -> None:
+    nvm = tmp_path / "nvm"
+    pdcpd = start("--nvm", nvm)
+    pdcpd.port()
+    assert_one_line(run("pdcpd", "--can", "sim", "--host", "pty", "--nvm", nvm), str(nvm), "in use")
+    assert not pdcpd.has_ended()
+
+
+# --- the end ---
+
+
+def test_sigterm(limb: Start, tmp_path: Path) -> None:
+    link = tmp_path / "arbitrator"
+    pdcpd = limb("--host", f"pty:{link}")
+    path = pdcpd.port()
+    assert str(link.readlink()) == path
+    assert pdcpd.stop() == 0
+    assert not link.is_symlink()
+
+
+def test_sigterm_of_a_device(start: Start, start_node: Start, files: dict[str, Path]) -> None:
+    pdcpd = start("--can", "sim:0")
+    node = start_node(pdcpd, files["d1"])
+    until(lambda: any("0002:0002:0004" in line for line in pdcpd.errors), "the device is there")
+    assert node.stop() == 0
+    assert node.errors == []
+
+
+def test_a_stale_link_is_replaced(start: Start, tmp_path: Path) -> None:
+    link = tmp_path / "arbitrator"
+    pdcpd = start("--host", f"pty:{link}")
+    pdcpd.port()
+    pdcpd.kill()
+    assert link.is_symlink()
+    path = start("--host", f"pty:{link}").port()
+    assert str(link.readlink()) == path
+    with Host(str(link)) as host:
+        assert host.system_info() == (0, 0, 0, 0)
+
+
+def test_two_with_the_same_link(start: Start, tmp_path: Path) -> None:
+    """The link is the later one's, and the earlier one does not take it away."""
+    link = tmp_path / "arbitrator"
+    first = start("--host", f"pty:{link}")
+    first.port()
+    second = start("--host", f"pty:{link}")
+    path = second.port()
+    assert str(link.readlink()) == path
+    assert first.stop() == 0
+    with Host(str(link)) as host:
+        assert host.system_info() == (0, 0, 0, 0)
+    assert second.stop() == 0
+    assert not link.is_symlink()
+
+
+def test_tcp_port_is_free_at_once_after_the_end(start: Start, start_node: Start, files: dict[str, Path]) -> None:
+    """The listening socket is reusable at once after a restart, although a connection was open."""
+    pdcpd = start("--can", "sim:0")
+    port = pdcpd.bus_port()
+    start_node(pdcpd, files["d1"])
+    until(lambda: any("0002:0002:0004" in line for line in pdcpd.errors), "the device is there")
+    assert pdcpd.stop() == 0
+    assert start("--can", f"sim:{port}").bus_port() == port
+
+
+# --- what they read ---
+
+
+def test_configuration_file(start: Start, connect: Connect, files: dict[str, Path], tmp_path: Path) -> None:
+    """Section [pdcpd]; the command line adds to it."""
+    link = tmp_path / "arbitrator"
+    config = tmp_path / "pdcpd.ini"
+    config.write_text(f"[pdcpd]\nnode = {files['d1']}\nstrict-crc = yes\n", encoding="utf-8")
+    host = connect(start("--config", config, "--host", f"pty:{link}", "--node", files["d3"]))
+    until(lambda: host.system_info()[:3] == (2, 2, 1), "both devices are set up")
+    host.send_bytes(bytes.fromhex("FE 19 01 22 5A 00 00 00"))
+    assert host.receive().payload == b"\x0c"
+
+
+def test_a_device_keeps_its_state(
+    start: Start, start_node: Start, connect: Connect, files: dict[str, Path], tmp_path: Path
+) -> None:
+    """[PROFILE 4.3.2]: node id and sources stand in the state file, and outlive both programs; the device asks for its
+    source by itself (pdcp-bus.md 7)."""
+    state = tmp_path / "d2.state"
+    text = files["d2"].read_text(encoding="utf-8").replace("[device]\n", f"[device]\nstate = {state}\n")
+    files["d2"].write_text(text, encoding="utf-8")
+    output, input_ = Channel(Identity(2, 2, 4), 1), Channel(Identity(2, 2, 5), 2)
+    pdcpd = start("--can", "sim:0")
+    host = connect(pdcpd)
+    nodes = [start_node(pdcpd, files[name]) for name in ("d1", "d2")]
+    until(lambda: host.system_info() == (2, 2, 4, 0), "two devices are set up")
+    assert host.configure_link(output, input_) == 2
+    for program in (*nodes, pdcpd):
+        assert program.stop() == 0
+    assert "node_id 32" in state.read_text(encoding="utf-8").splitlines()
+    assert "source 2 0002 0002 0004 1 5000 2120" in state.read_text(encoding="utf-8").splitlines()
+    pdcpd = start("--can", "sim:0")
+    host = connect(pdcpd)
+    for name in ("d2", "d1"):
+        start_node(pdcpd, files[name])
+    until(lambda: host.links() == [(output, input_, 2)], "the link is back")
+
+
+def test_nothing_is_left_in_the_working_folder(programs: Path, tmp_path: Path) -> None:
+    process = subprocess.Popen(
+        [programs / "pdcpd", "--can", "sim", "--host", "pty"], cwd=tmp_path, stdout=subprocess.PIPE, text=True
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stdout.readline().startswith("host /dev/")
+    finally:
+        process.terminate()
+        assert process.wait(5) == 0
+    assert list(tmp_path.iterdir()) == []

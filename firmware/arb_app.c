@@ -26,7 +26,7 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
     memset(app, 0, sizeof *app);
     app->port = port;
     app->work = true;
-    pdcp_arb_init(&app->arb, now_ms, on_event, app);
+    pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
     arb_hostapi_init(&app->api);
     app->api.strict = settings->strict_crc;
     arb_store_load(&app->store, port, &app->arb.bind);

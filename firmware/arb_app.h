@@ -12,6 +12,7 @@
 #include "pdcp_arb.h"
 
 typedef struct {
+    uint32_t serial; /* of this arbitrator: tells two on one bus apart (D-BUS-12) */
     bool strict_crc; /* refuse host messages with wrong checksums (D-API-1) */
 } arb_settings_t;
 

@@ -6,18 +6,27 @@
 #include "pdcp_setup.h"
 #include "pdcp_time.h"
 
-void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, pdcp_event_fn on_event, void *ctx)
+/* Nothing is known of the bus; what is remembered and counted stays. */
+static void forget_bus(pdcp_arb_t *arb, uint32_t now_ms)
 {
-    memset(arb, 0, sizeof *arb);
     pdcp_nodes_init(&arb->bus.nodes);
     pdcp_timers_init(&arb->bus.timers);
     pdcp_txq_init(&arb->bus.txq);
-    pdcp_bind_init(&arb->bind);
     pdcp_link_init(&arb->link);
-    arb->bus.on_event = on_event;
-    arb->bus.event_ctx = ctx;
+    memset(arb->bind.reserved, 0, sizeof arb->bind.reserved);
+    memset(arb->strangers, 0, sizeof arb->strangers);
     arb->started_ms = now_ms;
     pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms);
+}
+
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx)
+{
+    memset(arb, 0, sizeof *arb);
+    pdcp_bind_init(&arb->bind);
+    arb->bus.on_event = on_event;
+    arb->bus.event_ctx = ctx;
+    arb->spread_ms = (uint16_t)(serial % PDCP_STANDBY_SPREAD_MS);
+    forget_bus(arb, now_ms);
 }
 
 static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
@@ -61,6 +70,14 @@ static void host_ends(pdcp_arb_t *arb, uint32_t now_ms, pdcp_status_t status)
     arb->bus.on_event(arb->bus.event_ctx, now_ms, &event);
 }
 
+static void reset_ends(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_status_t status)
+{
+    if (node_of(arb, node)->reset_asked) {
+        node_of(arb, node)->reset_asked = false;
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_RESET, node, PDCP_NONE, status);
+    }
+}
+
 /* Takes a device out of service: whoever waits for it learns that it does not answer, its links become
  * inactive. */
 static void take_down(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
@@ -70,6 +87,7 @@ static void take_down(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
     device->setup_due = false;
     pdcp_request_cancel(&arb->bus, node);
     pdcp_link_on_lost(&arb->link, &arb->bus, now_ms, node);
+    reset_ends(arb, now_ms, node, PDCP_ERR_NO_ANSWER);
     if (arb->host.active && arb->host.node == node) {
         host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
     }
@@ -80,6 +98,7 @@ static void begin_setup(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
     pdcp_node_t *device = node_of(arb, node);
     device->setup_attempts = 0;
     device->heard_ms = now_ms;
+    device->taken_back = false;
     pdcp_setup_start(&arb->bus, node);
     expect_life(arb, now_ms, node);
 }
@@ -90,6 +109,15 @@ static void tell_lost(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
         node_of(arb, node)->beaconed = false;
         pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_LOST, node, PDCP_NONE, PDCP_OK);
     }
+}
+
+/* The device is gone; its ids are kept for it for a while. */
+static void lose(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    take_down(arb, now_ms, node);
+    node_of(arb, node)->asked_again = false;
+    set_life(arb, node, now_ms + PDCP_LOST_KEPT_MS);
+    tell_lost(arb, now_ms, node);
 }
 
 static void after_bind(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_bind_result_t result)
@@ -111,12 +139,14 @@ static void start_host_request(pdcp_arb_t *arb, uint32_t now_ms)
         return;
     }
     host->waiting = false;
-    if (host->set) {
+    if (host->code == PDCP_SET_PARAMETER) {
         pdcp_request_set(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
                          host->bytes, host->size);
-    } else {
+    } else if (host->code == PDCP_GET_PARAMETER) {
         pdcp_request_get(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
                          host->size);
+    } else {
+        pdcp_request_command(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->code, host->size);
     }
 }
 
@@ -136,11 +166,15 @@ static void serve(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
         pdcp_request_try_once(&arb->bus, node);
         return;
     }
+    if (device->reset_asked) {
+        pdcp_request_command(&arb->bus, now_ms, node, PDCP_CLIENT_RESET, PDCP_RESET, 0);
+        return;
+    }
     if (device->state != PDCP_NODE_SETUP) {
         return;
     }
     if (!device->setup_due && !pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node))) {
-        pdcp_setup_start(&arb->bus, node); /* another request came in the pause after a failed attempt */
+        device->setup_due = true; /* the pause after a failed attempt is over */
     }
     if (device->setup_due) {
         pdcp_setup_ask(&arb->bind, &arb->bus, now_ms, node);
@@ -160,6 +194,7 @@ static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *f
         return;
     }
     uint8_t node;
+    count(arb, PDCP_STAT_TAKEN);
     const pdcp_bind_result_t result =
         pdcp_bind_on_request(&arb->bind, &arb->bus, now_ms, &msg.identity, pdcp_id_node(frame->id), &node);
     after_bind(arb, now_ms, node, result);
@@ -168,16 +203,9 @@ static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *f
     }
 }
 
-/* A device that this arbitrator does not know beacons: it is told to reset and will then bind (D-BUS-15). */
-static void on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+/* Tells the device with this id to reset, at most once a second (D-BUS-15). It will then bind. */
+static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
 {
-    const uint8_t id = pdcp_id_node(frame->id);
-    const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
-    count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (!is_beacon || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX ||
-        pdcp_time_before(now_ms, arb->started_ms + PDCP_STRANGER_QUIET_MS)) {
-        return;
-    }
     for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
         if (arb->strangers[i].node_id == id && pdcp_time_before(now_ms, arb->strangers[i].until_ms)) {
             return;
@@ -193,13 +221,58 @@ static void on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fra
     }
 }
 
-static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
+/* A frame from an id that is not bound. */
+static void on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+{
+    const uint8_t id = pdcp_id_node(frame->id);
+    const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
+    count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
+    if (is_beacon && id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX &&
+        pdcp_time_reached(now_ms, arb->started_ms + PDCP_STRANGER_QUIET_MS)) {
+        reset_stranger(arb, now_ms, id);
+    }
+}
+
+/* D-BUS-12: this arbitrator falls silent; the host, if it waits, is told. */
+static void go_silent(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    const bool host_waits = arb->host.active;
+    const bool wish_waits = pdcp_link_wish_waits(&arb->link);
+    arb->silent = true;
+    forget_bus(arb, now_ms);
+    if (host_waits) {
+        host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
+    }
+    if (wish_waits) {
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, PDCP_NONE, PDCP_ERR_NO_ANSWER);
+    }
+    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_SILENT, PDCP_NONE, PDCP_NONE, PDCP_OK);
+}
+
+/* D-BUS-12: heard soon after the own start, another arbitrator was there first; heard later, this one was. */
+static void on_foreign_beacon(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    const bool again = arb->foreign && pdcp_time_before(now_ms, arb->foreign_ms + PDCP_STANDBY_MS);
+    count(arb, PDCP_STAT_FOREIGN_BEACON);
+    arb->foreign = true;
+    arb->foreign_ms = now_ms;
+    if (!arb->silent && pdcp_time_before(now_ms, arb->started_ms + PDCP_STANDBY_HEARD_MS)) {
+        go_silent(arb, now_ms);
+    } else if (!arb->silent && !again) {
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_FOREIGN, PDCP_NONE, PDCP_NONE, PDCP_OK);
+    }
+    if (arb->silent) {
+        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms + PDCP_STANDBY_MS + arb->spread_ms);
+    }
+}
+
+static void on_arbitrator_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
 {
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         count(arb, PDCP_STAT_DROP_UNUSED_ID);
     } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && frame->dlc == 1 &&
                frame->data[0] == PDCP_BEACON) {
-        count(arb, PDCP_STAT_FOREIGN_BEACON);
+        on_foreign_beacon(arb, now_ms);
     } else {
         count(arb, PDCP_STAT_DROP_ARBITRATOR);
     }
@@ -227,11 +300,13 @@ static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
 static bool on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
+    count(arb, PDCP_STAT_TAKEN);
     if (device->beaconed && device->state != PDCP_NODE_LOST) {
         return false;
     }
     if (device->state == PDCP_NODE_LOST) {
         begin_setup(arb, now_ms, node); /* reads who it is before anything else (D-BUS-15) */
+        device->taken_back = true;
         serve(arb, now_ms, node);
     }
     device->beaconed = true;
@@ -242,17 +317,26 @@ static bool on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
 {
     pdcp_host_request_t *host = &arb->host;
-    if (!host->set && reply->len != 0 && reply->offset + reply->len <= host->size) {
+    if (host->code == PDCP_GET_PARAMETER && reply->len != 0 && reply->offset + reply->len <= host->size) {
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
         host->len = (uint16_t)(reply->offset + reply->len);
     }
-    if (host->set && reply->done && reply->status == PDCP_OK && host->channel == 0) {
+    if (host->code == PDCP_SET_PARAMETER && reply->done && reply->status == PDCP_OK && host->channel == 0) {
         pdcp_setup_take_time(node_of(arb, host->node), host->param, host->bytes,
                              (uint8_t)(host->size < PDCP_VALUE_MAX ? host->size : PDCP_VALUE_MAX));
         expect_life(arb, now_ms, host->node);
     }
     if (reply->done) {
         host_ends(arb, now_ms, (pdcp_status_t)reply->status);
+    }
+}
+
+/* A device that has answered Reset Device is lost until it binds again. */
+static void reset_on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_status_t status)
+{
+    reset_ends(arb, now_ms, node, status);
+    if (status == PDCP_OK) {
+        lose(arb, now_ms, node);
     }
 }
 
@@ -276,7 +360,12 @@ static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_
     }
     switch ((pdcp_client_t)reply->client) {
     case PDCP_CLIENT_SETUP:
-        pdcp_setup_on_reply(&arb->bus, now_ms, node, reply);
+        if (pdcp_setup_on_reply(&arb->bus, now_ms, node, reply) == PDCP_ERR_UNKNOWN &&
+            node_of(arb, node)->taken_back) {
+            reset_stranger(arb, now_ms, node_of(arb, node)->node_id);
+            lose(arb, now_ms, node);
+            return;
+        }
         if (reply->channel == 0 && reply->param == PDCP_DEV_BEACON_INTERVAL) {
             expect_life(arb, now_ms, node);
         }
@@ -289,6 +378,9 @@ static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_
         break;
     case PDCP_CLIENT_HOST:
         host_on_reply(arb, now_ms, reply);
+        break;
+    case PDCP_CLIENT_RESET:
+        reset_on_reply(arb, now_ms, node, (pdcp_status_t)reply->status);
         break;
     default:
         break;
@@ -325,10 +417,18 @@ static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can
     } else if (!is_from_device(msg.code)) {
         count(arb, PDCP_STAT_DROP_DIRECTION);
     } else if (msg.code == PDCP_UPDATE_CHANNEL) {
+        count(arb, PDCP_STAT_TAKEN);
         pdcp_link_on_update(&arb->link, &arb->bus, node, msg.channel);
-    } else if (pdcp_request_on_message(&arb->bus, now_ms, node, &msg, &reply)) {
-        on_reply(arb, now_ms, node, &reply);
-        serve(arb, now_ms, node);
+    } else {
+        const uint32_t late = arb->bus.stats[PDCP_STAT_DROP_LATE];
+        const bool replied = pdcp_request_on_message(&arb->bus, now_ms, node, &msg, &reply);
+        if (arb->bus.stats[PDCP_STAT_DROP_LATE] == late) {
+            count(arb, PDCP_STAT_TAKEN);
+        }
+        if (replied) {
+            on_reply(arb, now_ms, node, &reply);
+            serve(arb, now_ms, node);
+        }
     }
 }
 
@@ -340,7 +440,11 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return false;
     }
     if (pdcp_id_from_arbitrator(frame->id)) {
-        on_arbitrator_frame(arb, frame);
+        on_arbitrator_frame(arb, now_ms, frame);
+        return arb->silent;
+    }
+    if (arb->silent) {
+        count(arb, PDCP_STAT_DROP_SILENT);
         return false;
     }
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
@@ -372,6 +476,19 @@ static void send_beacon(pdcp_arb_t *arb, uint32_t now_ms)
     pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms + PDCP_BEACON_MS);
 }
 
+/* The beacon's deadline is also the end of the standby: long enough no other arbitrator was heard (D-BUS-12).
+ */
+static void on_beacon_deadline(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    if (arb->silent) {
+        arb->silent = false;
+        arb->foreign = false;
+        forget_bus(arb, now_ms);
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_STARTED, PDCP_NONE, PDCP_NONE, PDCP_OK);
+    }
+    send_beacon(arb, now_ms);
+}
+
 static void on_life_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
@@ -382,10 +499,7 @@ static void on_life_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
         set_life(arb, node, lost_ms);
     } else {
         count(arb, PDCP_STAT_LOST);
-        take_down(arb, now_ms, node);
-        device->asked_again = false;
-        set_life(arb, node, now_ms + PDCP_LOST_KEPT_MS);
-        tell_lost(arb, now_ms, node);
+        lose(arb, now_ms, node);
     }
 }
 
@@ -401,7 +515,11 @@ static void on_request_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 static void on_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t timer)
 {
     if (timer == PDCP_TIMER_BEACON) {
-        send_beacon(arb, now_ms);
+        on_beacon_deadline(arb, now_ms);
+    } else if (timer == PDCP_TIMER_LINK) {
+        pdcp_link_on_ready(&arb->link, &arb->bus, PDCP_NONE);
+    } else if (timer == PDCP_TIMER_RECOVERY) {
+        arb->restart = true;
     } else if (timer >= PDCP_TIMER_LIFE) {
         on_life_deadline(arb, now_ms, (uint8_t)(timer - PDCP_TIMER_LIFE));
     } else {
@@ -433,13 +551,19 @@ void pdcp_arb_tx_pop(pdcp_arb_t *arb)
     count(arb, PDCP_STAT_TX);
 }
 
+/* Can the device be asked? */
+static bool is_bound(const pdcp_arb_t *arb, uint8_t node)
+{
+    if (node >= PDCP_DEVICES_MAX) {
+        return false;
+    }
+    const uint8_t state = arb->bus.nodes.nodes[node].state;
+    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST;
+}
+
 static pdcp_status_t host_request(pdcp_arb_t *arb, const pdcp_host_request_t *request)
 {
-    if (request->node >= PDCP_DEVICES_MAX) {
-        return PDCP_ERR_UNKNOWN;
-    }
-    const uint8_t state = node_of(arb, request->node)->state;
-    if (state == PDCP_NODE_FREE || state == PDCP_NODE_LOST) {
+    if (!is_bound(arb, request->node)) {
         return PDCP_ERR_UNKNOWN;
     }
     if (arb->host.active) {
@@ -454,17 +578,71 @@ static pdcp_status_t host_request(pdcp_arb_t *arb, const pdcp_host_request_t *re
 pdcp_status_t pdcp_arb_get(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
                            uint16_t size)
 {
-    const pdcp_host_request_t request = {
-        .node = node, .channel = channel, .param = param, .bytes = bytes, .size = size};
+    const pdcp_host_request_t request = {.code = PDCP_GET_PARAMETER,
+                                         .node = node,
+                                         .channel = channel,
+                                         .param = param,
+                                         .bytes = bytes,
+                                         .size = size};
     return host_request(arb, &request);
 }
 
 pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
                            uint16_t size)
 {
-    const pdcp_host_request_t request = {
-        .set = true, .node = node, .channel = channel, .param = param, .bytes = bytes, .size = size};
+    const pdcp_host_request_t request = {.code = PDCP_SET_PARAMETER,
+                                         .node = node,
+                                         .channel = channel,
+                                         .param = param,
+                                         .bytes = bytes,
+                                         .size = size};
     return host_request(arb, &request);
+}
+
+pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint16_t time_ms)
+{
+    const pdcp_host_request_t request = {.code = code, .node = node, .size = time_ms};
+    return host_request(arb, &request);
+}
+
+bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
+{
+    const pdcp_msg_t msg = {.code = code, .word = time_ms};
+    return !arb->silent && pdcp_bus_send(&arb->bus, PDCP_PRIORITY_NORMAL, PDCP_NODE_BROADCAST, &msg);
+}
+
+bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    if (!is_bound(arb, node)) {
+        return false;
+    }
+    node_of(arb, node)->reset_asked = true;
+    serve(arb, now_ms, node);
+    return true;
+}
+
+void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state)
+{
+    if (state == arb->recovery.state) {
+        return;
+    }
+    const uint16_t pause_ms = pdcp_recovery_on_state(&arb->recovery, now_ms, state);
+    pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_RECOVERY);
+    if (pause_ms != 0) {
+        count(arb, PDCP_STAT_BUS_OFF);
+        arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
+        pdcp_txq_init(
+            &arb->bus.txq); /* when the bus is back they would be stale; requests repeat themselves */
+        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_RECOVERY, now_ms + pause_ms);
+    }
+    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_STATE, PDCP_NONE, PDCP_NONE, (pdcp_status_t)state);
+}
+
+bool pdcp_arb_take_restart(pdcp_arb_t *arb)
+{
+    const bool restart = arb->restart;
+    arb->restart = false;
+    return restart;
 }
 
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)

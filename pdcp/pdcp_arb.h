@@ -16,18 +16,19 @@
 #include "pdcp_bind.h"
 #include "pdcp_bus.h"
 #include "pdcp_link.h"
+#include "pdcp_recovery.h"
 
-/* The host's request for a parameter; one at a time. */
+/* The host's request to a device; one at a time. */
 typedef struct {
     bool active;
     bool waiting; /* for the device's place */
-    bool set;     /* else get */
+    uint8_t code; /* PDCP_GET_PARAMETER, PDCP_SET_PARAMETER, PDCP_SUSPEND, PDCP_RELEASE */
     uint8_t node;
     uint8_t channel;
     uint8_t param;
     uint8_t *bytes; /* the application's, size bytes of room or of value */
-    uint16_t size;
-    uint16_t len; /* got so far */
+    uint16_t size;  /* of PDCP_SUSPEND: the time in ms */
+    uint16_t len;   /* got so far */
 } pdcp_host_request_t;
 
 /* An id that is not bound and was told to reset (D-BUS-15). */
@@ -46,10 +47,17 @@ typedef struct {
     pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
     uint8_t next_stranger;
     uint32_t started_ms;
+    uint32_t foreign_ms; /* when another arbitrator was heard last */
+    uint16_t spread_ms;  /* of the standby, from the serial number */
+    bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */
+    bool silent;         /* on standby (D-BUS-12) */
+    bool restart;        /* the controller is to be restarted */
+    pdcp_recovery_t recovery;
 } pdcp_arb_t;
 
-/* on_event: see pdcp_bus.h. The first beacon is due at once. */
-void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, pdcp_event_fn on_event, void *ctx);
+/* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).
+ * The first beacon is due at once. */
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx);
 
 /* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. True:
  * it may have led to something, pdcp_arb_step is to be called. False: nothing is due earlier than before; so
@@ -76,6 +84,23 @@ pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8
  * once. PDCP_ERR_UNKNOWN: wrong direction; PDCP_ERR_OWN: same device; PDCP_ERR_BUSY: another one is under
  * way. */
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input);
+
+/* Suspend (time_ms: 0 = until released) or Release for one device, as a request of the host: answers and
+ * outcome as with pdcp_arb_get. */
+pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint16_t time_ms);
+
+/* Suspend or Release for all, sent to N=0; devices do not answer. False: no room in the transmit queue. */
+bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms);
+
+/* Resets a device; several may be under way. PDCP_EVENT_RESET will come, once: a device that answered is lost
+ * until it binds again. False: no such device. */
+bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node);
+
+/* The controller's state, whenever it has changed (pdcp_recovery.h). */
+void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state);
+
+/* True, once: the controller is to be restarted now. */
+bool pdcp_arb_take_restart(pdcp_arb_t *arb);
 
 /* Is a device being set up? */
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb);

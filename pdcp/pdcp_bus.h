@@ -18,9 +18,14 @@ typedef enum {
     PDCP_EVENT_REFUSED,      /* a device was refused: no node id or no place left */
     PDCP_EVENT_DUPLICATE,    /* node: a second device claims its identity and was refused */
     PDCP_EVENT_IDENTITIES,   /* the table of remembered identities has changed */
-    PDCP_EVENT_LINK,   /* channel (an input): its link has changed; status: PDCP_OK or why it was not made */
-    PDCP_EVENT_WISH,   /* channel: the link that the host asked for is made, or status says why not */
-    PDCP_EVENT_REQUEST /* node: the host's request has ended with status; len bytes of value */
+    PDCP_EVENT_LINK,    /* channel (an input): its link has changed; status: PDCP_OK or why it was not made */
+    PDCP_EVENT_WISH,    /* channel: the link that the host asked for is made, or status says why not */
+    PDCP_EVENT_RESET,   /* node: the reset that was asked for has ended with status */
+    PDCP_EVENT_FOREIGN, /* another arbitrator is heard; this one stays (D-BUS-12) */
+    PDCP_EVENT_SILENT,  /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
+    PDCP_EVENT_STARTED, /* and has started afresh */
+    PDCP_EVENT_STATE,   /* the bus has another state; status holds it (pdcp_bus_state_t) */
+    PDCP_EVENT_REQUEST  /* node: the host's request has ended with status; len bytes of value */
 } pdcp_event_kind_t;
 
 typedef struct {

@@ -305,7 +305,7 @@ static void silence_again(pdcp_link_t *link, pdcp_channel_t *channel)
 
 /* The link of an input could not be made: it is what it was before, or remembered as inactive; one that
  * worked is made anew. */
-static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus)
+static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
 {
     pdcp_channel_t *input = channel_of(bus, link->input);
     pdcp_bus_count(bus, PDCP_STAT_LINK_FAILED);
@@ -319,6 +319,8 @@ static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus)
     if (link->old_link == PDCP_LINK_ACTIVE) {
         input->link = PDCP_LINK_INACTIVE;
         put_todo(link, input, PDCP_TODO_CONNECT);
+    } else if (input->link == PDCP_LINK_INACTIVE && link->status == PDCP_ERR_NO_ANSWER) {
+        pdcp_timers_set(&bus->timers, PDCP_TIMER_LINK, now_ms + PDCP_LINK_PAUSE_MS); /* D-BUS-26 */
     }
     silence_again(link, input);
 }
@@ -356,7 +358,7 @@ static void end(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
     } else if (link->status == PDCP_OK) {
         settle_made(link, bus);
     } else {
-        settle_failed(link, bus);
+        settle_failed(link, bus, now_ms);
     }
     if (link->kind == PDCP_TODO_UPDATE && input != NULL) {
         answer_update(bus, input->node, input->index, link->status == PDCP_OK ? PDCP_SUCCESS : PDCP_FAILURE);

@@ -41,13 +41,20 @@ void pdcp_link_init(pdcp_link_t *link);
 /* Asks for exactly this link. The outcome comes as PDCP_EVENT_WISH. False: another wish is under way. */
 bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input);
 
+/* Is a wish of the host under way? */
+static inline bool pdcp_link_wish_waits(const pdcp_link_t *link)
+{
+    return link->wish_input != PDCP_NONE || (link->active && link->for_host);
+}
+
 /* Takes the link of an input away. */
 void pdcp_link_remove(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t input);
 
 /* A device sent Update Data Channel for its channel index. */
 void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8_t index);
 
-/* A device is set up: inactive links whose other end is there are made. */
+/* A device is set up (PDCP_NONE: the pause after a link that was not answered is over): inactive links whose
+ * ends are both there are made. */
 void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node);
 
 /* A device is gone or was reset: its links become inactive, what it fed is silenced (D-BUS-14). Its request

@@ -37,6 +37,8 @@ typedef struct {
     uint8_t channel_count;
     uint8_t first_channel; /* number in the pool, PDCP_NONE: has none */
     bool beaconed;         /* counts for the host (D-BUS-6) */
+    bool taken_back;       /* it beaconed while lost; who it is has not been read yet (D-BUS-15) */
+    bool reset_asked;      /* Reset Device is to be sent, or is under way */
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
     uint8_t asked_id;      /* with this id */
     bool setup_due;        /* the next request of the setup is to be sent */

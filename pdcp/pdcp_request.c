@@ -35,6 +35,7 @@ static void send(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
     pdcp_msg_t msg = {.code = request->code, .param = request->param, .channel = request->channel};
     switch ((pdcp_request_state_t)request->state) {
     case PDCP_REQUEST_ANSWER:
+        msg.word = request->size; /* of 08 */
         if (request->code == PDCP_SET_PARAMETER) {
             msg.len = (uint8_t)request->size;
             memcpy(msg.value, request->value, msg.len);
@@ -107,6 +108,14 @@ void pdcp_request_set(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_clien
     start(bus, now_ms, node, &what);
 }
 
+void pdcp_request_command(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client, uint8_t code,
+                          uint16_t time_ms)
+{
+    const pdcp_request_t what = {
+        .client = (uint8_t)client, .code = code, .size = time_ms, .state = PDCP_REQUEST_ANSWER};
+    start(bus, now_ms, node, &what);
+}
+
 void pdcp_request_try_once(pdcp_bus_t *bus, uint8_t node)
 {
     request_of(bus, node)->tries_left = 0;
@@ -173,15 +182,17 @@ static bool answers(const pdcp_request_t *request, const pdcp_msg_t *msg, pdcp_r
     return request->state == state && request->param == msg->param && request->channel == msg->channel;
 }
 
-static bool on_parameter(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                         pdcp_reply_t *reply)
+/* 83 and 84, and the answers to commands. */
+static bool on_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
+                      pdcp_reply_t *reply)
 {
     const pdcp_request_t *request = request_of(bus, node);
     if (!answers(request, msg, PDCP_REQUEST_ANSWER) || msg->code != (request->code | PDCP_ANSWER)) {
         late(bus);
         return false;
     }
-    if (msg->result == PDCP_USE_BULK) {
+    const bool is_parameter = request->code == PDCP_GET_PARAMETER || request->code == PDCP_SET_PARAMETER;
+    if (is_parameter && msg->result == PDCP_USE_BULK) {
         enter(bus, now_ms, node,
               request->code == PDCP_GET_PARAMETER ? PDCP_REQUEST_GET_SIZE : PDCP_REQUEST_SET_SIZE);
         return false;
@@ -300,7 +311,10 @@ bool pdcp_request_on_message(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, con
     switch (msg->code) {
     case PDCP_GET_PARAMETER | PDCP_ANSWER:
     case PDCP_SET_PARAMETER | PDCP_ANSWER:
-        return on_parameter(bus, now_ms, node, msg, reply);
+    case PDCP_SUSPEND | PDCP_ANSWER:
+    case PDCP_RELEASE | PDCP_ANSWER:
+    case PDCP_RESET | PDCP_ANSWER:
+        return on_answer(bus, now_ms, node, msg, reply);
     case PDCP_BULK_GET | PDCP_ANSWER:
         return on_get_size(bus, now_ms, node, msg, reply);
     case PDCP_BULK_SET | PDCP_ANSWER:

@@ -19,6 +19,7 @@ typedef enum {
     PDCP_CLIENT_SETUP,
     PDCP_CLIENT_LINK,
     PDCP_CLIENT_HOST,
+    PDCP_CLIENT_RESET,
     PDCP_CLIENT_BIND /* is the device with this identity still there? */
 } pdcp_client_t;
 
@@ -45,7 +46,7 @@ typedef enum {
 /* Belongs to one device's place in the table. */
 typedef struct {
     const uint8_t *bytes; /* value to be set by bulk; NULL: it is in value */
-    uint16_t size;        /* of the whole value: to be set, or as 8C says */
+    uint16_t size;        /* of the whole value: to be set, or as 8C says; 08: the time in ms */
     uint16_t max_size;    /* longest value that may be got */
     uint16_t offset;      /* bytes transferred so far */
     uint8_t state;        /* pdcp_request_state_t */
@@ -81,6 +82,10 @@ void pdcp_request_get(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_
                       uint8_t channel, uint8_t param, uint16_t max_size);
 void pdcp_request_set(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
                       uint8_t channel, uint8_t param, const uint8_t *bytes, uint16_t len);
+
+/* Suspend (time_ms: 0 = until released), Release or Reset Device [PDCP 3.2.4, 3.2.5, 3.2.7]. */
+void pdcp_request_command(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
+                          uint8_t code, uint16_t time_ms);
 
 /* Lets the request that is under way be sent no more than this once. */
 void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);

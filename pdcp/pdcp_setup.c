@@ -59,23 +59,30 @@ static steps_t steps_of(pdcp_bus_t *bus, uint8_t node)
     }
 }
 
+/* The device is left bound but unlinked. */
+static void give_up(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+{
+    bus->nodes.nodes[node].state = PDCP_NODE_FAILED;
+    pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
+    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_SETUP_FAILED, node, PDCP_NONE, PDCP_OK);
+}
+
+/* The step has failed: the same again after a pause, so that on a bad line what is done stays done. */
 static void fail(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
 {
     pdcp_node_t *device = &bus->nodes.nodes[node];
     device->setup_attempts++;
     if (device->setup_attempts < PDCP_SETUP_ATTEMPTS) {
         pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node), now_ms + PDCP_SETUP_PAUSE_MS);
-        return;
+    } else {
+        give_up(bus, now_ms, node);
     }
-    device->state = PDCP_NODE_FAILED;
-    pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_SETUP_FAILED, node, PDCP_NONE, PDCP_OK);
 }
 
 static void no_room(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
 {
     pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
-    fail(bus, now_ms, node);
+    give_up(bus, now_ms, node);
 }
 
 /* Writes of the setup: transfer enabled 0, and the node id of an output. False: no node id is left. */
@@ -146,6 +153,7 @@ static void go_on(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
 {
     pdcp_node_t *device = &bus->nodes.nodes[node];
     device->setup_step++;
+    device->setup_attempts = 0;
     device->setup_due = true;
     if (device->setup_step < steps_of(bus, node).count) {
         return;
@@ -293,27 +301,29 @@ static bool take(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
     return take_channel(bus, node, reply);
 }
 
-void pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
 {
     static const uint8_t nothing[1] = {0};
     const pdcp_node_t *device = &bus->nodes.nodes[node];
     const bool mandatory = steps_of(bus, node).steps[device->setup_step].mandatory;
+    const bool has_value = !reply->done || reply->status == PDCP_OK;
     pdcp_reply_t part = *reply;
     if (part.bytes == NULL) {
         part.bytes = nothing;
     }
-    const bool has_value = !reply->done || reply->status == PDCP_OK;
     if (has_value && !take(bus, node, &part)) {
+        const bool other = device->setup_pass == PASS_DEVICE && reply->param <= PDCP_DEV_SERIAL;
         pdcp_request_cancel(bus, node);
         fail(bus, now_ms, node);
-        return;
+        return other ? PDCP_ERR_UNKNOWN : PDCP_OK;
     }
     if (!reply->done) {
-        return;
+        return PDCP_OK;
     }
     if (reply->status == PDCP_ERR_NO_ANSWER || (reply->status != PDCP_OK && mandatory)) {
         fail(bus, now_ms, node);
-        return;
+    } else {
+        go_on(bus, now_ms, node);
     }
-    go_on(bus, now_ms, node);
+    return PDCP_OK;
 }

@@ -3,8 +3,8 @@
  *
  * Four passes: the device's own parameters; transfer enabled 0 to every channel; the direction of every
  * channel; everything else of every channel. Each device is on its own way, so that none holds up another. A
- * step that fails ends the attempt; after a pause the setup starts again, and after PDCP_SETUP_ATTEMPTS
- * attempts the device is left bound but unlinked (D-BUS-17). */
+ * step that fails is tried again after a pause; when it has failed PDCP_SETUP_ATTEMPTS times, or there is no
+ * room, the device is left bound but unlinked (D-BUS-17). */
 #ifndef PDCP_SETUP_H
 #define PDCP_SETUP_H
 
@@ -23,8 +23,8 @@ void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, u
  * by the host (D-BUS-25), within the limits of D-BUS-13. Other parameters: nothing. */
 void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, const uint8_t *value, uint8_t len);
 
-/* A reply to a request of PDCP_CLIENT_SETUP. When an attempt has failed, the timer of the device's requests
- * runs until the next one is to be started. */
-void pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply);
+/* A reply to a request of PDCP_CLIENT_SETUP. When the step has failed, the timer of the device's requests
+ * runs until it is to be tried again. PDCP_ERR_UNKNOWN: the device is another than the bound one. */
+pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply);
 
 #endif

@@ -92,9 +92,15 @@ enum {
     PDCP_DEVICE_BIND_MAX_MS = 8000, /* device role: longest pause between requests (D-BUS-16) */
     PDCP_DEVICE_SILENCE_MS = 3000,  /* device role: arbitrator gone (D-BUS-16) */
     PDCP_SETUP_PAUSE_MS = 250,      /* between two attempts to set a device up (D-BUS-17) */
-    PDCP_SETUP_ATTEMPTS = 3,        /* D-BUS-17 */
-    PDCP_STRANGER_QUIET_MS = 1200,  /* no Reset to strangers so soon after our start (D-BUS-15) */
-    PDCP_STRANGER_PAUSE_MS = 1000   /* between two Resets to the same id (D-BUS-15) */
+    PDCP_SETUP_ATTEMPTS = 5,        /* D-BUS-17 */
+    PDCP_LINK_PAUSE_MS = 500,       /* until a link that was not answered is tried again (D-BUS-26) */
+    PDCP_STANDBY_HEARD_MS = 1200,   /* another arbitrator heard so soon: go silent (D-BUS-12) */
+    PDCP_STANDBY_MS = 2000,         /* silent without a foreign beacon: start afresh, plus the spread */
+    PDCP_STANDBY_SPREAD_MS = 1000,  /* by serial number (D-BUS-12) */
+    PDCP_RECOVERY_MS = 100,         /* first pause before leaving bus-off, doubling */
+    PDCP_RECOVERY_MAX_MS = 5000,
+    PDCP_STRANGER_QUIET_MS = 1200, /* no Reset to strangers so soon after our start (D-BUS-15) */
+    PDCP_STRANGER_PAUSE_MS = 1000  /* between two Resets to the same id (D-BUS-15) */
 };
 
 /* VID, PID and serial number: who a device is [PDCP 3.2.1]. */

@@ -1,6 +1,7 @@
 /* Counters of the bus: every frame that is dropped is counted by its cause, and the host can read them all.
  *
- * The order is part of the host API (2413h, D-API-5): append, never insert. All are 32-bit and wrap. */
+ * The order is part of the host API (2413h, D-API-5): append, never insert. All are 32-bit and wrap. Every
+ * received frame is counted in exactly one of the DROP counters, CHANNEL_DATA, FOREIGN_BEACON or TAKEN. */
 #ifndef PDCP_STATS_H
 #define PDCP_STATS_H
 
@@ -38,6 +39,10 @@ typedef enum {
     PDCP_STAT_LOST,           /* devices lost */
     PDCP_STAT_LINK_FAILED,    /* links that could not be made and were undone */
     PDCP_STAT_STRANGER_RESET, /* Reset Device sent to an id that is not bound (D-BUS-15) */
+    PDCP_STAT_TAKEN,          /* frames for the arbitrator that it has made use of */
+    PDCP_STAT_DROP_SILENT,    /* everything but foreign beacons while on standby (D-BUS-12) */
+    PDCP_STAT_TX_DISCARDED,   /* frames that waited when the bus went off */
+    PDCP_STAT_BUS_OFF,        /* times that the controller went off the bus */
     PDCP_STAT_COUNT
 } pdcp_stat_t;
 

@@ -13,6 +13,8 @@ enum {
     PDCP_TIMER_REQUEST = 0,             /* + slot: acknowledgement time, pause between attempts */
     PDCP_TIMER_LIFE = PDCP_DEVICES_MAX, /* + slot: silence of a device, keeping of a lost one */
     PDCP_TIMER_BEACON = 2 * PDCP_DEVICES_MAX,
+    PDCP_TIMER_LINK,     /* links that were not answered are tried again */
+    PDCP_TIMER_RECOVERY, /* the controller leaves bus-off */
     PDCP_TIMERS_MAX
 };
 

@@ -3,6 +3,9 @@
 #include <stddef.h>
 #include <string.h>
 
+/* Last identifier of high priority [PDCP figure 2.3]. */
+#define PDCP_TX_URGENT_ID 0x1FFu
+
 void pdcp_txq_init(pdcp_txq_t *txq)
 {
     memset(txq, 0, sizeof *txq);
@@ -10,7 +13,8 @@ void pdcp_txq_init(pdcp_txq_t *txq)
 
 bool pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame)
 {
-    if (txq->count == PDCP_TX_MAX) {
+    const bool urgent = frame->id <= PDCP_TX_URGENT_ID;
+    if (txq->count >= (urgent ? PDCP_TX_MAX : PDCP_TX_MAX - PDCP_TX_URGENT)) {
         return false;
     }
     uint8_t at = txq->count;

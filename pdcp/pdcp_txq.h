@@ -17,7 +17,7 @@ typedef struct {
 
 void pdcp_txq_init(pdcp_txq_t *txq);
 
-/* Copies the frame in. False: full. */
+/* Copies the frame in. False: full; the last PDCP_TX_URGENT places are for high priority alone. */
 bool pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame);
 
 /* The frame that leaves next, NULL when there is none. Valid until the queue is changed. */

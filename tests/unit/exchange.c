@@ -48,7 +48,7 @@ void exchange_start(exchange_t *x, uint32_t now_ms)
     memset(x, 0, sizeof *x);
     x->now_ms = now_ms;
     x->arb = &x->alone;
-    pdcp_arb_init(x->arb, now_ms, on_event, x);
+    pdcp_arb_init(x->arb, now_ms, 250, on_event, x);
     exchange_tx(x, "100#0A");
     exchange_silence(x);
 }

@@ -45,6 +45,14 @@ void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
     }
 }
 
+void arb_app_on_state(arb_app_t *app, uint32_t now_ms, pdcp_bus_state_t state)
+{
+    if (state != (pdcp_bus_state_t)app->arb.recovery.state) {
+        pdcp_arb_on_state(&app->arb, now_ms, state);
+        app->work = true;
+    }
+}
+
 uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len)
 {
     app->work = true;
@@ -76,6 +84,9 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
         next_ms = pdcp_arb_step(&app->arb, now_ms);
         again = arb_hostapi_step(&app->api, &app->arb, app->port, now_ms);
     } while (again);
+    if (pdcp_arb_take_restart(&app->arb) && app->port->can_restart != NULL) {
+        app->port->can_restart(app->port->ctx);
+    }
     send_frames(app);
     arb_store_step(&app->store, app->port, &app->arb.bind, now_ms);
     next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));

@@ -41,6 +41,9 @@ void arb_app_observe(arb_app_t *app, arb_observer_t observer, void *ctx);
  * be handed in before one step. */
 void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame);
 
+/* The controller's state, whenever it may have changed; telling the same state again is harmless. */
+void arb_app_on_state(arb_app_t *app, uint32_t now_ms, pdcp_bus_state_t state);
+
 /* Bytes from the host. Returns how many were taken; the rest is offered again after the next step. */
 uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len);
 

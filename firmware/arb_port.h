@@ -17,6 +17,9 @@ typedef struct {
      * in the next arb_app_step, which the program calls as soon as there is room. */
     bool (*can_send)(void *ctx, const can_frame_t *frame);
 
+    /* Restarts the controller after bus-off. NULL: it recovers by itself. */
+    void (*can_restart)(void *ctx);
+
     /* Writes up to size bytes to the host; they are copied. Returns how many were taken; less than size means
      * no room now: the program calls arb_app_step as soon as there is some. */
     size_t (*host_write)(void *ctx, const uint8_t *bytes, size_t size);

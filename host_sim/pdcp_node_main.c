@@ -6,9 +6,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
-#include <sys/random.h>
 
 #include "hal_can.h"
+#include "hal_sys.h"
 #include "linux_can.h"
 #include "loop.h"
 #include "node_ini.h"
@@ -220,17 +220,10 @@ static bool complain(const char *error)
     return false;
 }
 
-static uint32_t any_seed(void)
-{
-    uint32_t seed = 0;
-    (void)getrandom(&seed, sizeof seed, 0);
-    return seed;
-}
-
 static bool open_all(app_t *app, const options_t *options)
 {
     char error[512];
-    const uint32_t seed = options->seeded ? options->seed : any_seed();
+    const uint32_t seed = options->seeded ? options->seed : hal_sys_serial();
     for (size_t i = 0; i < options->file_count; i++) {
         app->inis[i] = node_ini_load(options->files[i], error, sizeof error);
         if (app->inis[i] == NULL) {

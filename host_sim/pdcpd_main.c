@@ -9,6 +9,7 @@
 #include <string.h>
 
 #include "arb_app.h"
+#include "hal_sys.h"
 #include "linux_can.h"
 #include "linux_nvm.h"
 #include "linux_uart.h"
@@ -59,6 +60,12 @@ static void say(const daemon_t *daemon, pdcpd_log_t level, const char *format, .
     va_end(arguments);
 }
 
+static const char *bus_state_name(int8_t state)
+{
+    static const char *const names[] = {"active", "error-passive", "bus-off", "down"};
+    return names[state];
+}
+
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
 {
     const daemon_t *daemon = ctx;
@@ -89,6 +96,19 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
     case PDCP_EVENT_DUPLICATE:
         say(daemon, PDCPD_LOG_WARNING, "%s exists twice: the second device was refused", name);
         break;
+    case PDCP_EVENT_FOREIGN:
+        say(daemon, PDCPD_LOG_WARNING,
+            "another arbitrator is on the bus; this one was there first and stays");
+        break;
+    case PDCP_EVENT_SILENT:
+        say(daemon, PDCPD_LOG_WARNING, "another arbitrator was there first: on standby, silent");
+        break;
+    case PDCP_EVENT_STARTED:
+        say(daemon, PDCPD_LOG_WARNING, "the other arbitrator is gone: takes over");
+        break;
+    case PDCP_EVENT_STATE:
+        say(daemon, PDCPD_LOG_WARNING, "bus state: %s", bus_state_name(event->status));
+        break;
     case PDCP_EVENT_LINK:
         say(daemon, PDCPD_LOG_INFO, "%s channel %u: link status %u%s", name,
             nodes->channels[event->channel].index, nodes->channels[event->channel].link,
@@ -105,6 +125,14 @@ static bool can_send(void *ctx, const can_frame_t *frame)
 {
     daemon_t *daemon = ctx;
     return daemon->world != NULL ? sim_world_send(daemon->world, frame) : hal_can_send(daemon->can, frame);
+}
+
+static void can_restart(void *ctx)
+{
+    daemon_t *daemon = ctx;
+    if (daemon->can != NULL) {
+        hal_can_restart(daemon->can);
+    }
 }
 
 static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
@@ -178,6 +206,7 @@ static void take_frames(daemon_t *daemon, uint32_t now_ms)
             arb_app_on_frame(&daemon->app, now_ms, &frames[i]);
         }
     } while (count == RECEIVE_BATCH);
+    arb_app_on_state(&daemon->app, now_ms, (pdcp_bus_state_t)hal_can_health(daemon->can).state);
     daemon->can_ready = false;
 }
 
@@ -317,11 +346,12 @@ static bool start(daemon_t *daemon)
 {
     daemon->port = (arb_port_t){.ctx = daemon,
                                 .can_send = can_send,
+                                .can_restart = can_restart,
                                 .host_write = host_write,
                                 .nvm_read = nvm_read,
                                 .nvm_write = nvm_write,
                                 .nvm_status = nvm_status};
-    const arb_settings_t settings = {.strict_crc = daemon->options.strict_crc};
+    const arb_settings_t settings = {.serial = hal_sys_serial(), .strict_crc = daemon->options.strict_crc};
     const uint32_t now_ms = (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);
     arb_app_init(&daemon->app, &daemon->port, &settings, now_ms);
     arb_app_observe(&daemon->app, on_event, daemon);

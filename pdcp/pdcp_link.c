@@ -127,7 +127,7 @@ void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
             continue;
         }
         input->feed = find_source(bus, input);
-        const bool concerned = input->node == node ||
+        const bool concerned = node == PDCP_NONE || input->node == node ||
                                (input->feed != PDCP_NONE && bus->nodes.channels[input->feed].node == node);
         if (concerned && input->feed != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
             put_todo(link, input, PDCP_TODO_CONNECT);

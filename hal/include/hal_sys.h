@@ -1,0 +1,11 @@
+/* Contract: what a target knows of itself. */
+#ifndef HAL_SYS_H
+#define HAL_SYS_H
+
+#include <stdint.h>
+
+/* A number that tells this device from others of its kind: a serial number where the part has one, otherwise
+ * a random one, another at every call. May be called from anywhere. */
+uint32_t hal_sys_serial(void);
+
+#endif

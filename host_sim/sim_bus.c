@@ -176,10 +176,11 @@ static void deliver_frame(sim_bus_t *bus)
     bus->idle_from_us = bus->frame_end_us + SIM_BUS_INTERFRAME_BITS;
     bus->frames++;
     bus->sender = -1;
+    const bool lost = bus->fault != NULL && bus->fault(bus->fault_ctx, &bus->on_wire);
     for (int i = 0; i < bus->ports_end; i++) {
         sim_bus_port_t *port = &bus->ports[i];
 
-        if (port->attached && !port->joining && i != sender && port->receive != NULL) {
+        if (port->attached && !port->joining && !lost && i != sender && port->receive != NULL) {
             port->receive(port->ctx, bus->frame_end_us, &bus->on_wire);
         }
         port->joining = false;

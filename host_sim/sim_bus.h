@@ -45,6 +45,9 @@ typedef struct {
     void *ctx;
 } sim_bus_port_t;
 
+/* A fault of the line: true means that nobody receives this frame (its sender believes that it was sent). */
+typedef bool (*sim_bus_fault_t)(void *ctx, const can_frame_t *frame);
+
 /* To be read by everybody, written by sim_bus.c alone. About 22 KB. */
 typedef struct {
     sim_bus_port_t ports[SIM_BUS_PORTS_MAX];
@@ -55,6 +58,8 @@ typedef struct {
     uint32_t waiting;      /* frames in all queues */
     uint64_t frame_end_us; /* end of the last bit of the frame on the wire */
     uint64_t idle_from_us; /* end of the last interframe space */
+    sim_bus_fault_t fault; /* NULL: a perfect line; set by whoever owns the bus */
+    void *fault_ctx;
     uint64_t frames;       /* delivered since the start */
     uint64_t busy_us;      /* bus time of the delivered frames, interframe space included */
 } sim_bus_t;

@@ -45,9 +45,11 @@ static void to_text(const can_frame_t *frame, char *text, size_t size)
 
 void exchange_start(exchange_t *x, uint32_t now_ms)
 {
+    /* Not in exchange_t: the RAM of a small machine does not hold it beside an application. */
+    static pdcp_arb_t alone;
     memset(x, 0, sizeof *x);
     x->now_ms = now_ms;
-    x->arb = &x->alone;
+    x->arb = &alone;
     pdcp_arb_init(x->arb, now_ms, 250, on_event, x);
     exchange_tx(x, "100#0A");
     exchange_silence(x);

@@ -8,9 +8,8 @@
 enum { EXCHANGE_EVENTS = 64 };
 
 typedef struct {
-    pdcp_arb_t *arb; /* alone, or the one of app */
+    pdcp_arb_t *arb; /* the one that stands alone, of which a program has one, or the one of app */
     arb_app_t *app;  /* NULL: the arbitrator stands alone */
-    pdcp_arb_t alone;
     uint32_t now_ms;
     pdcp_event_t events[EXCHANGE_EVENTS]; /* since they were cleared */
     int event_count;

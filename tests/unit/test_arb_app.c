@@ -9,11 +9,11 @@
 static exchange_t x;
 static arb_app_t app;
 
-static uint8_t host_out[4096]; /* what the host has read */
+static uint8_t host_out[1024]; /* what the host has read */
 static size_t host_len;
 static size_t host_room; /* bytes that it still takes */
 
-static uint8_t memory[32768];
+static uint8_t memory[ARB_STORE_AREAS * ARB_STORE_AREA];
 static int writes_left; /* before the power fails; -1: it does not */
 static size_t bytes_left_of_last;
 
@@ -37,6 +37,7 @@ static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
 static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
 {
     (void)ctx;
+    TEST_ASSERT_LESS_OR_EQUAL(sizeof memory, (size_t)address + size);
     memcpy(bytes, &memory[address], size);
     return true;
 }
@@ -46,6 +47,7 @@ static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_
     (void)ctx;
     TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(ARB_PORT_NVM_PAGE, address % ARB_PORT_NVM_PAGE + size,
                                       "crosses a page");
+    TEST_ASSERT_LESS_OR_EQUAL(sizeof memory, (size_t)address + size);
     if (writes_left == 0) {
         memcpy(&memory[address], bytes, bytes_left_of_last < size ? bytes_left_of_last : size);
         bytes_left_of_last = 0;

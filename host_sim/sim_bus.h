@@ -60,8 +60,8 @@ typedef struct {
     uint64_t idle_from_us; /* end of the last interframe space */
     sim_bus_fault_t fault; /* NULL: a perfect line; set by whoever owns the bus */
     void *fault_ctx;
-    uint64_t frames;       /* delivered since the start */
-    uint64_t busy_us;      /* bus time of the delivered frames, interframe space included */
+    uint64_t frames;  /* delivered since the start */
+    uint64_t busy_us; /* bus time of the delivered frames, interframe space included */
 } sim_bus_t;
 
 void sim_bus_init(sim_bus_t *bus);

@@ -4,11 +4,11 @@ bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdc
 {
     can_frame_t frame;
     pdcp_encode(pdcp_can_id(priority, true, node_id), msg, &frame);
-    if (!pdcp_txq_put(&bus->txq, &frame)) {
+    const pdcp_txq_put_t put = pdcp_txq_put(&bus->txq, &frame);
+    if (put != PDCP_TXQ_TAKEN) {
         pdcp_bus_count(bus, PDCP_STAT_TX_FULL);
-        return false;
     }
-    return true;
+    return put != PDCP_TXQ_FULL;
 }
 
 void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,

@@ -22,11 +22,11 @@ static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
 
 static bool put_frame(pdcp_device_t *dev, const can_frame_t *frame)
 {
-    if (!pdcp_txq_put(&dev->txq, frame)) {
+    const pdcp_txq_put_t put = pdcp_txq_put(&dev->txq, frame);
+    if (put != PDCP_TXQ_TAKEN) {
         dev->stats.tx_full++;
-        return false;
     }
-    return true;
+    return put != PDCP_TXQ_FULL;
 }
 
 /* The same frame waits already: a second one would say nothing new. */

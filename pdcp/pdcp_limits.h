@@ -21,9 +21,6 @@
 #define PDCP_TX_MAX 16 /* frames waiting for the controller */
 #endif
 
-/* Places of the transmit queue that only high-priority frames may take: a beacon always finds room. */
-#define PDCP_TX_URGENT 2
-
 #ifndef PDCP_RESERVED_MAX
 #define PDCP_RESERVED_MAX 8 /* suggested ids waiting for their device (D-BUS-6) */
 #endif

@@ -10,7 +10,8 @@
 typedef enum {
     PDCP_STAT_RX = 0,  /* frames handed to the arbitrator */
     PDCP_STAT_TX,      /* frames handed to the controller */
-    PDCP_STAT_TX_FULL, /* a frame found the transmit queue full; a request is repeated, the rest is lost */
+    PDCP_STAT_TX_FULL, /* a full transmit queue lost a frame, the new or the least urgent one; a request is
+                          repeated */
     PDCP_STAT_DROP_EXTENDED,   /* 29-bit identifier */
     PDCP_STAT_DROP_REMOTE,     /* remote frame */
     PDCP_STAT_DROP_ERROR,      /* error report of the controller */

@@ -3,19 +3,20 @@
 #include <stddef.h>
 #include <string.h>
 
-/* Last identifier of high priority [PDCP figure 2.3]. */
-#define PDCP_TX_URGENT_ID 0x1FFu
-
 void pdcp_txq_init(pdcp_txq_t *txq)
 {
     memset(txq, 0, sizeof *txq);
 }
 
-bool pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame)
+pdcp_txq_put_t pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame)
 {
-    const bool urgent = frame->id <= PDCP_TX_URGENT_ID;
-    if (txq->count >= (urgent ? PDCP_TX_MAX : PDCP_TX_MAX - PDCP_TX_URGENT)) {
-        return false;
+    const bool full = txq->count == PDCP_TX_MAX;
+    if (full && frame->id >= txq->frames[0].id) {
+        return PDCP_TXQ_FULL;
+    }
+    if (full) {
+        txq->count--;
+        memmove(&txq->frames[0], &txq->frames[1], txq->count * sizeof txq->frames[0]);
     }
     uint8_t at = txq->count;
     while (at > 0 && txq->frames[at - 1].id <= frame->id) {
@@ -24,7 +25,7 @@ bool pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame)
     }
     txq->frames[at] = *frame;
     txq->count++;
-    return true;
+    return full ? PDCP_TXQ_PUSHED_OUT : PDCP_TXQ_TAKEN;
 }
 
 const can_frame_t *pdcp_txq_peek(const pdcp_txq_t *txq)

@@ -1,6 +1,6 @@
 /* Frames that wait for the controller, in the order in which they would win arbitration: by identifier,
- * oldest first among equals. An urgent frame overtakes all others; a full queue refuses, and the caller
- * decides what that means. */
+ * oldest first among equals. An urgent frame overtakes all others, and pushes the least urgent one out when
+ * the queue is full: a queue full of low priority never keeps a beacon or a link change waiting. */
 #ifndef PDCP_TXQ_H
 #define PDCP_TXQ_H
 
@@ -15,10 +15,17 @@ typedef struct {
     uint8_t count;
 } pdcp_txq_t;
 
+typedef enum {
+    PDCP_TXQ_TAKEN = 0,
+    PDCP_TXQ_PUSHED_OUT, /* taken, but the frame that would have left last is gone */
+    PDCP_TXQ_FULL        /* not taken */
+} pdcp_txq_put_t;
+
 void pdcp_txq_init(pdcp_txq_t *txq);
 
-/* Copies the frame in. False: full; the last PDCP_TX_URGENT places are for high priority alone. */
-bool pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame);
+/* Copies the frame in. A full queue takes it only if it is more urgent than the frame that would leave last.
+ */
+pdcp_txq_put_t pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame);
 
 /* The frame that leaves next, NULL when there is none. Valid until the queue is changed. */
 const can_frame_t *pdcp_txq_peek(const pdcp_txq_t *txq);

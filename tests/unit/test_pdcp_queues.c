@@ -75,9 +75,19 @@ static void test_frames_leave_in_order_of_arbitration(void)
     for (uint32_t round = 0; round < FRAME_ROUNDS; round++) {
         if (any(2) == 0) {
             const can_frame_t frame = {.id = (uint16_t)any(5), .dlc = 1, .data = {serial++}};
-            TEST_ASSERT_EQUAL(count < PDCP_TX_MAX, pdcp_txq_put(&txq, &frame));
+            unsigned last = 0; /* leaves last: the highest identifier, the youngest among equals */
+            for (unsigned i = 1; i < count; i++) {
+                last = model[i].id >= model[last].id ? i : last;
+            }
             if (count < PDCP_TX_MAX) {
+                TEST_ASSERT_EQUAL(PDCP_TXQ_TAKEN, pdcp_txq_put(&txq, &frame));
                 model[count++] = frame;
+            } else if (frame.id >= model[last].id) {
+                TEST_ASSERT_EQUAL(PDCP_TXQ_FULL, pdcp_txq_put(&txq, &frame));
+            } else {
+                TEST_ASSERT_EQUAL(PDCP_TXQ_PUSHED_OUT, pdcp_txq_put(&txq, &frame));
+                memmove(&model[last], &model[last + 1], (count - last - 1) * sizeof model[0]);
+                model[count - 1] = frame;
             }
         } else if (count != 0) {
             unsigned first = 0;

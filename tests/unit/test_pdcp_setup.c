@@ -30,7 +30,8 @@ static void bind_device(void)
     exchange_tx(&x, "311#81 11 0200 0200 0500");
 }
 
-/* A controller with two inputs and an output, every parameter supported: the whole exchange in its order. */
+/* A controller with two inputs and an output, every parameter supported: the whole exchange in its order.
+ * D-BUS-24: the first output gets id FEh. */
 static void test_everything_is_read_and_written_in_order(void)
 {
     static const exchange_pair_t pairs[] = {
@@ -139,7 +140,8 @@ static void test_times_are_clamped_from_above(void)
     TEST_ASSERT_EQUAL(10000, node()->beacon_ms);
 }
 
-/* pdcp-bus.md 5: no answer within the acknowledgement time, 100 ms: repeated, twice. D-BUS-17: five times, 250 ms between them, then the device stays bound but unlinked. */
+/* pdcp-bus.md 5: no answer within the acknowledgement time, 100 ms: repeated, twice. D-BUS-17: five times,
+ * 250 ms between them, then the device stays bound but unlinked. */
 static void test_a_silent_device_is_tried_and_then_left(void)
 {
     bind_device();
@@ -362,13 +364,17 @@ static void test_a_device_is_lost_and_later_forgotten(void)
     TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0xFE]);
 }
 
-/* A device with a beacon interval of 100 ms that stops right after its binding: gone after 300 ms, not 1500. */
+/* A device with a beacon interval of 100 ms that stops right after its binding: gone after 300 ms, not 1500.
+ */
 static void test_a_short_beacon_interval_counts_at_once(void)
 {
     static const exchange_pair_t pairs[] = {
-        {"311#03 01 00", "211#83 01 01 00 0200 0200"}, {"311#03 02 00", "211#83 01 02 00 0500"},
-        {"311#03 06 00", "211#83 00 06 00"},           {"311#03 0B 00", "211#83 00 0B 00"},
-        {"311#03 0A 00", "211#83 01 0A 00 6400"},      {"311#03 09 00", "211#83 01 09 00 00"},
+        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
+        {"311#03 02 00", "211#83 01 02 00 0500"},
+        {"311#03 06 00", "211#83 00 06 00"},
+        {"311#03 0B 00", "211#83 00 0B 00"},
+        {"311#03 0A 00", "211#83 01 0A 00 6400"},
+        {"311#03 09 00", "211#83 01 09 00 00"},
         {NULL, NULL},
     };
     bind_device();
@@ -469,7 +475,7 @@ static void test_the_next_deadline_is_known(void)
 static void test_a_full_transmit_queue_loses_no_request(void)
 {
     can_frame_t filler = exchange_frame("5FF#00");
-    while (pdcp_txq_put(&x.arb->bus.txq, &filler)) {
+    while (pdcp_txq_put(&x.arb->bus.txq, &filler) == PDCP_TXQ_TAKEN) {
     }
     exchange_rx(&x, "611#01 0200 0200 0500");
     TEST_ASSERT_GREATER_THAN(0, stat_of(PDCP_STAT_TX_FULL));

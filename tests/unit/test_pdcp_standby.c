@@ -251,16 +251,23 @@ static void test_a_bus_that_was_well_for_long_starts_from_100_ms(void)
     TEST_ASSERT_EQUAL(PDCP_BUS_ACTIVE, exchange_last(&x, PDCP_EVENT_STATE)->status);
 }
 
-/* A queue full of low priority never keeps a beacon out, and the beacon leaves first. */
-static void test_a_beacon_always_finds_room(void)
+/* A queue full of low priority never keeps a beacon or a link change out, and they leave first; what is
+ * pushed out is counted. */
+static void test_a_full_queue_delays_nothing_urgent(void)
 {
     can_frame_t filler = exchange_frame("5FF#00");
-    while (pdcp_txq_put(&x.arb->bus.txq, &filler)) {
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    while (pdcp_txq_put(&x.arb->bus.txq, &filler) == PDCP_TXQ_TAKEN) {
     }
     exchange_wait(&x, 500);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1),
+                                                pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)));
     exchange_tx(&x, "100#0A");
+    exchange_tx(&x, "312#04 05 01 0200 0200");
     exchange_tx(&x, "5FF#00");
-    TEST_ASSERT_EQUAL(0, stat_of(PDCP_STAT_TX_FULL));
+    TEST_ASSERT_EQUAL(
+        1, stat_of(PDCP_STAT_TX_FULL)); /* the beacon pushed one out, the link's write found its place */
 }
 
 int main(void)
@@ -278,6 +285,6 @@ int main(void)
     RUN_TEST(test_a_link_that_was_not_answered_is_tried_again);
     RUN_TEST(test_bus_off_is_left_with_a_growing_pause);
     RUN_TEST(test_a_bus_that_was_well_for_long_starts_from_100_ms);
-    RUN_TEST(test_a_beacon_always_finds_room);
+    RUN_TEST(test_a_full_queue_delays_nothing_urgent);
     return UNITY_END();
 }

@@ -150,17 +150,16 @@ static void send_all(app_t *app, uint64_t now_us)
     }
 }
 
-static void receive_all(app_t *app, uint64_t now_us)
+/* Whether a node listens to other sources than at the last call. */
+static bool listening_changed(app_t *app)
 {
-    can_frame_t frames[RECEIVE_BATCH];
-    size_t count;
-    while ((count = hal_can_receive(app->can, frames, RECEIVE_BATCH)) != 0) {
-        for (size_t i = 0; i < count; i++) {
-            deliver(app, now_us, NULL, &frames[i]);
-            send_all(app, now_us); /* what is copied leaves at once and fills no queue */
-        }
-        app->frames_received += count;
+    bool changed = false;
+    for (size_t i = 0; i < app->count; i++) {
+        const uint16_t changes = pdcp_device_listen_changes(sim_node_device(app->nodes[i]));
+        changed = changed || app->listen_changes[i] != changes;
+        app->listen_changes[i] = changes;
     }
+    return changed;
 }
 
 /* Only the arbitrator and the sources of enabled inputs are of interest. */
@@ -168,20 +167,32 @@ static void set_filters(app_t *app)
 {
     hal_can_filter_t filters[FILTERS_MAX];
     size_t count = 0;
-    bool changed = false;
+    if (!listening_changed(app)) {
+        return;
+    }
     filters[count++] = (hal_can_filter_t){.id = 0x100, .mask = 0x100};
     for (size_t i = 0; i < app->count; i++) {
-        const pdcp_device_t *device = sim_node_device(app->nodes[i]);
         uint8_t ids[PDCP_DEVICE_CHANNELS_MAX];
-        const uint8_t listens_to = pdcp_device_listens_to(device, ids, PDCP_DEVICE_CHANNELS_MAX);
-        changed = changed || app->listen_changes[i] != pdcp_device_listen_changes(device);
-        app->listen_changes[i] = pdcp_device_listen_changes(device);
+        const uint8_t listens_to =
+            pdcp_device_listens_to(sim_node_device(app->nodes[i]), ids, PDCP_DEVICE_CHANNELS_MAX);
         for (uint8_t j = 0; j < listens_to && count < FILTERS_MAX; j++) {
             filters[count++] = (hal_can_filter_t){.id = ids[j], .mask = 0x1FF}; /* any priority, mode 0 */
         }
     }
-    if (changed) {
-        hal_can_set_filters(app->can, filters, count < FILTERS_MAX ? count : 0);
+    hal_can_set_filters(app->can, filters, count < FILTERS_MAX ? count : 0);
+}
+
+static void receive_all(app_t *app, uint64_t now_us)
+{
+    can_frame_t frames[RECEIVE_BATCH];
+    size_t count;
+    while ((count = hal_can_receive(app->can, frames, RECEIVE_BATCH)) != 0) {
+        for (size_t i = 0; i < count; i++) {
+            deliver(app, now_us, NULL, &frames[i]);
+            set_filters(app);      /* before the answer: the source may send right after it */
+            send_all(app, now_us); /* what is copied leaves at once and fills no queue */
+        }
+        app->frames_received += count;
     }
 }
 
@@ -190,7 +201,6 @@ static void work(app_t *app)
 {
     const uint64_t now_us = loop_now_us(app->loop);
     uint64_t next_us = UINT64_MAX;
-    receive_all(app, now_us);
     for (bool again = true; again;) {
         const uint64_t sent = app->frames_sent;
         for (size_t i = 0; i < app->count; i++) {
@@ -207,9 +217,11 @@ static void work(app_t *app)
     loop_set_deadline_us(app->loop, next_us);
 }
 
+/* Takes the frames within the call; the rest of the work is done when the loop returns. */
 static void on_ready(void *ctx)
 {
-    (void)ctx; /* the loop returns, and the work is done then */
+    app_t *app = ctx;
+    receive_all(app, loop_now_us(app->loop));
 }
 
 /* --- start and end --- */

@@ -34,7 +34,6 @@ typedef struct {
     size_t host_count;
 
     hal_can_t *can; /* a bus outside; NULL: the one in world */
-    bool can_ready;
 
     sim_world_t *world; /* NULL: the bus is outside */
     socketcand_server_t *server;
@@ -166,11 +165,6 @@ static void on_uart_ready(void *ctx)
     ((daemon_t *)ctx)->uart_ready = true;
 }
 
-static void on_can_ready(void *ctx)
-{
-    ((daemon_t *)ctx)->can_ready = true;
-}
-
 static void on_server_changed(void *ctx)
 {
     (void)ctx; /* the world runs after every turn of the loop */
@@ -196,8 +190,12 @@ static void take_host_bytes(daemon_t *daemon, uint32_t now_ms)
     }
 }
 
-static void take_frames(daemon_t *daemon, uint32_t now_ms)
+/* Frames are taken here and now: a bus that is going away has no later. The rest of the work is done when the
+ * loop returns. */
+static void on_can_ready(void *ctx)
 {
+    daemon_t *daemon = ctx;
+    const uint32_t now_ms = (uint32_t)(loop_now_us(daemon->loop) / 1000u);
     can_frame_t frames[RECEIVE_BATCH];
     size_t count;
     do {
@@ -207,7 +205,6 @@ static void take_frames(daemon_t *daemon, uint32_t now_ms)
         }
     } while (count == RECEIVE_BATCH);
     arb_app_on_state(&daemon->app, now_ms, (pdcp_bus_state_t)hal_can_health(daemon->can).state);
-    daemon->can_ready = false;
 }
 
 /* One turn with a bus outside. */
@@ -215,9 +212,6 @@ static void work_outside(daemon_t *daemon)
 {
     const uint64_t now_us = loop_now_us(daemon->loop);
     const uint32_t now_ms = (uint32_t)(now_us / 1000u);
-    if (daemon->can_ready) {
-        take_frames(daemon, now_ms);
-    }
     if (daemon->uart_ready) {
         take_host_bytes(daemon, now_ms);
     }
@@ -392,7 +386,6 @@ static void close_all(daemon_t *daemon)
 static void run(daemon_t *daemon)
 {
     daemon->uart_ready = true;
-    daemon->can_ready = daemon->can != NULL;
     do {
         if (daemon->world != NULL) {
             work_world(daemon);

@@ -126,6 +126,8 @@ static uint8_t error_of(int8_t status)
         return ARB_ERR_REFUSED;
     case PDCP_ERR_BULK:
         return ARB_ERR_BULK;
+    case PDCP_ERR_BUSY:
+        return ARB_ERR_BUSY;
     default:
         return ARB_ERR_NO_ANSWER;
     }
@@ -400,9 +402,15 @@ static void flush(arb_hostapi_t *api, const arb_port_t *port)
 bool arb_hostapi_step(arb_hostapi_t *api, pdcp_arb_t *arb, const arb_port_t *port, uint32_t now_ms)
 {
     api->handed = false;
-    arb_hostrx_on_time(&api->rx, now_ms);
+    const bool refusing = !urgent_has_room(api);
+    if (!refusing) {
+        arb_hostrx_on_time(&api->rx, now_ms);
+    }
     accept_all(api);
     flush(api, port);
+    if (refusing) {
+        api->rx.last_ms = now_ms; /* the silence is ours: bytes were not taken */
+    }
     while (api->held_count != 0 && api->answer_len == 0 && api->urgent_len == 0 && serve(api, arb, now_ms)) {
         flush(api, port);
     }

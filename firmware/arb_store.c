@@ -148,6 +148,12 @@ static bool write_page(arb_store_t *store, const arb_port_t *port, const pdcp_bi
     const uint32_t crc = body_crc(bind, sequence);
     uint8_t page[ARB_PORT_NVM_PAGE];
     uint16_t len = 0;
+    if (store->written == 0) {
+        store->crc = crc;
+    } else if (store->crc != crc) { /* the order has changed meanwhile: from the start */
+        store->written = 0;
+        store->crc = crc;
+    }
     while (len < ARB_PORT_NVM_PAGE && store->written + len < body + ARB_STORE_CRC) {
         const uint16_t at = (uint16_t)(store->written + len);
         if (at < body) {

@@ -39,6 +39,7 @@ typedef struct {
     uint8_t area;      /* where it stands; ARB_STORE_AREAS: there is none */
     bool changed;      /* the table is newer than the copy */
     bool writing;
+    uint32_t crc;     /* of the copy being written */
     uint16_t written; /* bytes of the new copy handed over so far */
     uint32_t due_ms;
     uint32_t failures; /* writes that failed, since the start */

@@ -16,6 +16,7 @@ static void forget_bus(pdcp_arb_t *arb, uint32_t now_ms)
     memset(arb->bind.reserved, 0, sizeof arb->bind.reserved);
     memset(arb->strangers, 0, sizeof arb->strangers);
     arb->started_ms = now_ms;
+    arb->young = true;
     pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms);
 }
 
@@ -96,7 +97,7 @@ static void take_down(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 static void begin_setup(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
-    device->setup_attempts = 0;
+    device->setup_again = false;
     device->heard_ms = now_ms;
     device->taken_back = false;
     pdcp_setup_start(&arb->bus, node);
@@ -139,6 +140,7 @@ static void start_host_request(pdcp_arb_t *arb, uint32_t now_ms)
         return;
     }
     host->waiting = false;
+    pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
     if (host->code == PDCP_SET_PARAMETER) {
         pdcp_request_set(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
                          host->bytes, host->size);
@@ -170,10 +172,14 @@ static void serve(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
         pdcp_request_command(&arb->bus, now_ms, node, PDCP_CLIENT_RESET, PDCP_RESET, 0);
         return;
     }
+    const bool paused = pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node));
+    if (device->state == PDCP_NODE_FAILED && !paused) {
+        pdcp_setup_start(&arb->bus, node);
+    }
     if (device->state != PDCP_NODE_SETUP) {
         return;
     }
-    if (!device->setup_due && !pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node))) {
+    if (!device->setup_due && !paused) {
         device->setup_due = true; /* the pause after a failed attempt is over */
     }
     if (device->setup_due) {
@@ -203,6 +209,33 @@ static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *f
     }
 }
 
+/* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
+static bool is_young(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    arb->young = arb->young && pdcp_time_before(now_ms, arb->started_ms + PDCP_STRANGER_QUIET_MS);
+    return arb->young;
+}
+
+static void forget_strangers(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
+        if (pdcp_time_reached(now_ms, arb->strangers[i].until_ms)) {
+            arb->strangers[i].node_id = 0;
+        }
+    }
+}
+
+static pdcp_stranger_t *free_stranger(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    forget_strangers(arb, now_ms);
+    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
+        if (arb->strangers[i].node_id == 0) {
+            return &arb->strangers[i];
+        }
+    }
+    return NULL;
+}
+
 /* Tells the device with this id to reset, at most once a second (D-BUS-15). It will then bind. */
 static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
 {
@@ -211,8 +244,10 @@ static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
             return;
         }
     }
-    pdcp_stranger_t *entry = &arb->strangers[arb->next_stranger];
-    arb->next_stranger = (uint8_t)((arb->next_stranger + 1u) % PDCP_STRANGERS_MAX);
+    pdcp_stranger_t *entry = free_stranger(arb, now_ms);
+    if (entry == NULL) {
+        return; /* its turn comes within a second: nobody is told twice */
+    }
     entry->node_id = id;
     entry->until_ms = now_ms + PDCP_STRANGER_PAUSE_MS;
     const pdcp_msg_t reset = {.code = PDCP_RESET};
@@ -227,8 +262,7 @@ static void on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fra
     const uint8_t id = pdcp_id_node(frame->id);
     const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
     count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (is_beacon && id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX &&
-        pdcp_time_reached(now_ms, arb->started_ms + PDCP_STRANGER_QUIET_MS)) {
+    if (is_beacon && id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX && !is_young(arb, now_ms)) {
         reset_stranger(arb, now_ms, id);
     }
 }
@@ -256,7 +290,7 @@ static void on_foreign_beacon(pdcp_arb_t *arb, uint32_t now_ms)
     count(arb, PDCP_STAT_FOREIGN_BEACON);
     arb->foreign = true;
     arb->foreign_ms = now_ms;
-    if (!arb->silent && pdcp_time_before(now_ms, arb->started_ms + PDCP_STANDBY_HEARD_MS)) {
+    if (!arb->silent && is_young(arb, now_ms)) {
         go_silent(arb, now_ms);
     } else if (!arb->silent && !again) {
         pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_FOREIGN, PDCP_NONE, PDCP_NONE, PDCP_OK);
@@ -326,6 +360,9 @@ static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *
                              (uint8_t)(host->size < PDCP_VALUE_MAX ? host->size : PDCP_VALUE_MAX));
         expect_life(arb, now_ms, host->node);
     }
+    if (reply->done && reply->offset == 0 && reply->len == 0) {
+        host->len = 0; /* a transfer that began anew may have ended empty */
+    }
     if (reply->done) {
         host_ends(arb, now_ms, (pdcp_status_t)reply->status);
     }
@@ -350,7 +387,10 @@ static bool conclude_check(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const
     const bool answered = reply->status != PDCP_ERR_NO_ANSWER;
     const pdcp_bind_result_t result = pdcp_bind_after_check(&arb->bind, &arb->bus, now_ms, node, answered);
     after_bind(arb, now_ms, node, result);
-    return result == PDCP_BIND_GRANTED;
+    if (!answered && result == PDCP_BIND_SUGGESTED) { /* it was reset: known without a second check */
+        lose(arb, now_ms, node);
+    }
+    return !answered;
 }
 
 static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
@@ -368,6 +408,9 @@ static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_
         }
         if (reply->channel == 0 && reply->param == PDCP_DEV_BEACON_INTERVAL) {
             expect_life(arb, now_ms, node);
+        }
+        if (node_of(arb, node)->state == PDCP_NODE_FAILED) {
+            arb->link.due = true; /* an Update Data Channel may have waited for it */
         }
         if (reply->done && node_of(arb, node)->state == PDCP_NODE_READY) {
             pdcp_link_on_ready(&arb->link, &arb->bus, node);
@@ -480,6 +523,9 @@ static void send_beacon(pdcp_arb_t *arb, uint32_t now_ms)
  */
 static void on_beacon_deadline(pdcp_arb_t *arb, uint32_t now_ms)
 {
+    (void)is_young(arb, now_ms);
+    forget_strangers(arb, now_ms);
+    pdcp_bind_on_time(&arb->bind, now_ms);
     if (arb->silent) {
         arb->silent = false;
         arb->foreign = false;
@@ -503,6 +549,27 @@ static void on_life_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
     }
 }
 
+/* D-API-10: a request of the host, or a link, that cannot have its turn soon is given up, so that the host
+ * has its answer in time. */
+static void limit_host_wait(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    const bool waits = arb->host.waiting || arb->link.wish_input != PDCP_NONE;
+    const bool limited = pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_HOST);
+    if (waits && !limited) {
+        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_HOST, now_ms + PDCP_HOST_WAIT_MS);
+    } else if (!waits && limited) {
+        pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
+    }
+}
+
+static void on_host_deadline(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    if (arb->host.waiting) {
+        host_ends(arb, now_ms, PDCP_ERR_BUSY);
+    }
+    pdcp_link_forget_wish(&arb->link, &arb->bus, now_ms, PDCP_ERR_BUSY);
+}
+
 static void on_request_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     pdcp_reply_t reply;
@@ -518,6 +585,8 @@ static void on_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t timer)
         on_beacon_deadline(arb, now_ms);
     } else if (timer == PDCP_TIMER_LINK) {
         pdcp_link_on_ready(&arb->link, &arb->bus, PDCP_NONE);
+    } else if (timer == PDCP_TIMER_HOST) {
+        on_host_deadline(arb, now_ms);
     } else if (timer == PDCP_TIMER_RECOVERY) {
         arb->restart = true;
     } else if (timer >= PDCP_TIMER_LIFE) {
@@ -537,6 +606,7 @@ uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
         start_host_request(arb, now_ms);
     }
     pdcp_link_step(&arb->link, &arb->bus, now_ms);
+    limit_host_wait(arb, now_ms);
     return pdcp_timers_next_ms(&arb->bus.timers, now_ms);
 }
 
@@ -662,7 +732,8 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (arb->bus.nodes.nodes[i].state == PDCP_NODE_SETUP) {
+        const pdcp_node_t *node = &arb->bus.nodes.nodes[i];
+        if (node->state == PDCP_NODE_SETUP && !node->setup_again) {
             return true;
         }
     }

@@ -45,8 +45,8 @@ typedef struct {
     pdcp_link_t link;
     pdcp_host_request_t host;
     pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
-    uint8_t next_stranger;
-    uint32_t started_ms;
+    uint32_t started_ms; /* means something while young */
+    bool young;          /* in its first PDCP_STRANGER_QUIET_MS */
     uint32_t foreign_ms; /* when another arbitrator was heard last */
     uint16_t spread_ms;  /* of the standby, from the serial number */
     bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */

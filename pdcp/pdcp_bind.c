@@ -111,6 +111,15 @@ static void reserve(pdcp_bind_t *bind, uint32_t now_ms, const pdcp_identity_t *i
     best->until_ms = now_ms + PDCP_BIND_TIMEOUT_MS;
 }
 
+void pdcp_bind_on_time(pdcp_bind_t *bind, uint32_t now_ms)
+{
+    for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
+        if (pdcp_time_reached(now_ms, bind->reserved[i].until_ms)) {
+            bind->reserved[i].node_id = 0;
+        }
+    }
+}
+
 static void release_reserved(pdcp_bind_t *bind, uint32_t now_ms, const pdcp_identity_t *identity)
 {
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {

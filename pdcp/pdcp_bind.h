@@ -44,6 +44,9 @@ void pdcp_bind_init(pdcp_bind_t *bind);
  * out: false. */
 bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry);
 
+/* Frees reservations that are over; to be called every few days at least. */
+void pdcp_bind_on_time(pdcp_bind_t *bind, uint32_t now_ms);
+
 /* A bind request with node id asked. Answers it, unless the result is PDCP_BIND_CHECK. */
 pdcp_bind_result_t pdcp_bind_on_request(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms,
                                         const pdcp_identity_t *identity, uint8_t asked, uint8_t *node);

@@ -74,7 +74,8 @@ static bool output_is_needed(const pdcp_bus_t *bus, uint8_t output)
 /* An output that no active link needs any more is to be disabled. */
 static void release_output(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t output)
 {
-    if (is_ready(bus, output) && bus->nodes.channels[output].enabled && !output_is_needed(bus, output)) {
+    if (is_ready(bus, output) && bus->nodes.channels[output].transfer == PDCP_OUTPUT &&
+        bus->nodes.channels[output].enabled && !output_is_needed(bus, output)) {
         put_todo(link, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
     }
 }
@@ -149,13 +150,26 @@ static void deactivate(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint
     pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
 }
 
+static void give_back_old(const pdcp_link_t *link, pdcp_channel_t *input)
+{
+    input->source = link->old_source;
+    input->source_index = link->old_index;
+    input->source_type = link->old_type;
+    input->source_profile = link->old_profile;
+    input->link = link->old_link != PDCP_LINK_NONE ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE; /* D-BUS-10 */
+    input->feed = PDCP_NONE;
+}
+
 /* The job under way goes on without the channels of a device that is gone. */
-static void leave_job(pdcp_link_t *link, const pdcp_bus_t *bus, uint8_t node)
+static void leave_job(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
 {
     if (!link->active) {
         return;
     }
     if (link->input != PDCP_NONE && bus->nodes.channels[link->input].node == node) {
+        if (!link->undoing) {
+            give_back_old(link, &bus->nodes.channels[link->input]);
+        }
         link->input = PDCP_NONE;
     }
     if (link->output != PDCP_NONE && bus->nodes.channels[link->output].node == node) {
@@ -164,6 +178,19 @@ static void leave_job(pdcp_link_t *link, const pdcp_bus_t *bus, uint8_t node)
     if (link->at == node) {
         link->at = PDCP_NONE;
         link->waiting = true;
+    }
+}
+
+static void wish_ends(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+{
+    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->wish_input, status);
+    link->wish_input = PDCP_NONE;
+}
+
+void pdcp_link_forget_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+{
+    if (link->wish_input != PDCP_NONE) {
+        wish_ends(link, bus, now_ms, status);
     }
 }
 
@@ -185,6 +212,10 @@ void pdcp_link_on_lost(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint
         }
     }
     leave_job(link, bus, node);
+    if (link->wish_input != PDCP_NONE && (bus->nodes.channels[link->wish_input].node == node ||
+                                          bus->nodes.channels[link->wish_output].node == node)) {
+        wish_ends(link, bus, now_ms, PDCP_ERR_NO_ANSWER); /* its channels may be others' before its turn */
+    }
 }
 
 static bool is_input_step(uint8_t step)
@@ -245,16 +276,6 @@ static void take_old(pdcp_link_t *link, const pdcp_channel_t *input)
     link->old_feed = input->feed;
 }
 
-static void give_back_old(const pdcp_link_t *link, pdcp_channel_t *input)
-{
-    input->source = link->old_source;
-    input->source_index = link->old_index;
-    input->source_type = link->old_type;
-    input->source_profile = link->old_profile;
-    input->link = link->old_link;
-    input->feed = link->old_feed;
-}
-
 static void name_source(pdcp_link_t *link, pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = channel_of(bus, link->input);
@@ -265,7 +286,7 @@ static void name_source(pdcp_link_t *link, pdcp_bus_t *bus)
     input->source_profile = output->profile;
     input->feed = link->output;
     input->link = PDCP_LINK_INACTIVE;
-    link->output_was_on = output->enabled;
+    link->output_was_on = output_is_needed(bus, link->output); /* enabled alone means: may be */
 }
 
 static void begin(pdcp_link_t *link, pdcp_todo_t kind, uint8_t input, uint8_t output, step_t step)
@@ -309,15 +330,19 @@ static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
 {
     pdcp_channel_t *input = channel_of(bus, link->input);
     pdcp_bus_count(bus, PDCP_STAT_LINK_FAILED);
-    if (!link->output_was_on) {
+    if (link->output_was_on) {
+        release_output(link, bus, link->output); /* whose other listeners may be gone meanwhile */
+    } else {
         silence_again(link, channel_of(bus, link->output));
+    }
+    if (link->old_feed != link->output) {
+        release_output(link, bus, link->old_feed);
     }
     if (input == NULL) {
         return;
     }
-    input->feed = find_source(bus, input);
+    input->feed = input->link != PDCP_LINK_NONE ? find_source(bus, input) : PDCP_NONE;
     if (link->old_link == PDCP_LINK_ACTIVE) {
-        input->link = PDCP_LINK_INACTIVE;
         put_todo(link, input, PDCP_TODO_CONNECT);
     } else if (input->link == PDCP_LINK_INACTIVE && link->status == PDCP_ERR_NO_ANSWER) {
         pdcp_timers_set(&bus->timers, PDCP_TIMER_LINK, now_ms + PDCP_LINK_PAUSE_MS); /* D-BUS-26 */
@@ -360,7 +385,8 @@ static void end(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
     } else {
         settle_failed(link, bus, now_ms);
     }
-    if (link->kind == PDCP_TODO_UPDATE && input != NULL) {
+    const bool unread = link->status == PDCP_ERR_NO_ANSWER && link->step <= STEP_READ_SERIAL;
+    if (link->kind == PDCP_TODO_UPDATE && input != NULL && !unread) { /* else the device asks again */
         answer_update(bus, input->node, input->index, link->status == PDCP_OK ? PDCP_SUCCESS : PDCP_FAILURE);
     }
     tell_link(link, bus, now_ms);
@@ -397,6 +423,9 @@ static bool resolve(pdcp_link_t *link, pdcp_bus_t *bus)
     if (link->output == PDCP_NONE) {
         input->feed = PDCP_NONE;
         release_output(link, bus, link->old_feed);
+        if (input->enabled) {
+            put_todo(link, input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
+        }
         link->status = PDCP_ERR_UNKNOWN;
         return false;
     }
@@ -422,6 +451,9 @@ static bool advance(pdcp_link_t *link)
 static bool step_possible(const pdcp_link_t *link, const pdcp_bus_t *bus)
 {
     const bool needs_output = link->step == STEP_OUTPUT_ON || (link->step == STEP_NODES && !link->undoing);
+    if (!link->undoing && !is_ready(bus, link->input)) {
+        return false; /* there is no link to be made any more */
+    }
     if (needs_output && !is_ready(bus, link->output)) {
         return false;
     }
@@ -553,6 +585,11 @@ void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, con
     }
     took_effect(link, bus, reply);
     link->once = false;
+    if (!link->undoing && link->input == PDCP_NONE) {
+        give_up(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+        run(link, bus, now_ms);
+        return;
+    }
     if (link->step == STEP_READ_SERIAL && !resolve(link, bus)) {
         end(link, bus, now_ms);
         return;
@@ -594,19 +631,19 @@ static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
             begin(link, todo, number, channel->feed, STEP_INPUT_OFF);
             take_old(link, channel);
             name_source(link, bus);
+        } else {
+            silence_again(link, channel);
         }
         break;
-    default: /* PDCP_TODO_UPDATE */
+    default: /* PDCP_TODO_UPDATE; its direction may not have been known when it came */
+        if (channel->transfer != PDCP_INPUT) {
+            answer_update(bus, channel->node, channel->index, PDCP_FAILURE);
+            break;
+        }
         begin(link, todo, number, PDCP_NONE, STEP_READ_VID_PID);
         take_old(link, channel);
         break;
     }
-}
-
-static void wish_ends(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
-{
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->wish_input, status);
-    link->wish_input = PDCP_NONE;
 }
 
 static void start_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)

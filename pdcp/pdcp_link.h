@@ -41,6 +41,9 @@ void pdcp_link_init(pdcp_link_t *link);
 /* Asks for exactly this link. The outcome comes as PDCP_EVENT_WISH. False: another wish is under way. */
 bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input);
 
+/* A wish that has not been started ends with status. Nothing happens when there is none. */
+void pdcp_link_forget_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status);
+
 /* Is a wish of the host under way? */
 static inline bool pdcp_link_wish_waits(const pdcp_link_t *link)
 {

@@ -88,16 +88,21 @@ void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, uint8_t channel, uint8_t node
     }
 }
 
-static void free_channel(pdcp_nodes_t *nodes, uint8_t channel)
+void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel)
 {
-    pdcp_nodes_set_output_id(nodes, channel, 0);
-    memset(&nodes->channels[channel], 0, sizeof nodes->channels[channel]);
-    nodes->channels[channel].node = PDCP_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         if (nodes->channels[i].feed == channel) {
             nodes->channels[i].feed = PDCP_NONE;
         }
     }
+}
+
+static void free_channel(pdcp_nodes_t *nodes, uint8_t channel)
+{
+    pdcp_nodes_set_output_id(nodes, channel, 0);
+    memset(&nodes->channels[channel], 0, sizeof nodes->channels[channel]);
+    nodes->channels[channel].node = PDCP_NONE;
+    pdcp_nodes_drop_feed(nodes, channel);
 }
 
 /* Frees the channels of a device from the one with index count + 1 on. */

@@ -41,6 +41,7 @@ typedef struct {
     bool reset_asked;      /* Reset Device is to be sent, or is under way */
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
     uint8_t asked_id;      /* with this id */
+    bool setup_again;      /* it was left before: tried once more, silently (D-BUS-17) */
     bool setup_due;        /* the next request of the setup is to be sent */
     uint8_t setup_pass;    /* pdcp_setup.c */
     uint8_t setup_step;
@@ -132,6 +133,9 @@ void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, ui
 
 /* Does channel need (or desire) the input with this index of its own device? */
 bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index);
+
+/* No input is fed by this channel any more: it is gone, or no output now. */
+void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
 
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
 void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, uint8_t channel, uint8_t node_id);

@@ -59,12 +59,17 @@ static steps_t steps_of(pdcp_bus_t *bus, uint8_t node)
     }
 }
 
-/* The device is left bound but unlinked. */
+/* The device is left bound but unlinked; reported once, and tried again from time to time. */
 static void give_up(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
 {
-    bus->nodes.nodes[node].state = PDCP_NODE_FAILED;
-    pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_SETUP_FAILED, node, PDCP_NONE, PDCP_OK);
+    pdcp_node_t *device = &bus->nodes.nodes[node];
+    device->state = PDCP_NODE_FAILED;
+    pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node), now_ms + PDCP_SETUP_AGAIN_MS);
+    if (!device->setup_again) {
+        device->setup_again = true;
+        pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
+        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_SETUP_FAILED, node, PDCP_NONE, PDCP_OK);
+    }
 }
 
 /* The step has failed: the same again after a pause, so that on a bad line what is done stays done. */
@@ -126,6 +131,7 @@ void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
     device->setup_pass = PASS_DEVICE;
     device->setup_step = 0;
     device->setup_channel = PDCP_NONE;
+    device->setup_attempts = 0;
     device->setup_due = true;
     device->ack_ms = PDCP_ACK_MS;
     device->beacon_ms = PDCP_BEACON_MS;
@@ -136,6 +142,7 @@ static void enter_pass(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pass_t pa
     pdcp_node_t *device = &bus->nodes.nodes[node];
     if (device->first_channel == PDCP_NONE || pass > PASS_CHANNELS) {
         device->state = PDCP_NODE_READY;
+        device->setup_again = false;
         pdcp_bus_tell(bus, now_ms, PDCP_EVENT_READY, node, PDCP_NONE, PDCP_OK);
         return;
     }
@@ -219,13 +226,14 @@ static bool take_device(pdcp_bus_t *bus, uint8_t node, uint8_t param, const uint
 static void set_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (channel->transfer != transfer) {
+    if (channel->transfer != 0 && channel->transfer != transfer) {
         pdcp_nodes_set_output_id(&bus->nodes, number, 0);
+        pdcp_nodes_drop_feed(&bus->nodes, number);
         channel->link = PDCP_LINK_NONE;
         channel->todo = PDCP_TODO_NONE;
         channel->feed = PDCP_NONE;
-        channel->transfer = transfer;
     }
+    channel->transfer = transfer;
 }
 
 /* An input's own idea of its source counts only while the arbitrator knows of no link. */

@@ -93,6 +93,8 @@ enum {
     PDCP_DEVICE_SILENCE_MS = 3000,  /* device role: arbitrator gone (D-BUS-16) */
     PDCP_SETUP_PAUSE_MS = 250,      /* between two attempts to set a device up (D-BUS-17) */
     PDCP_SETUP_ATTEMPTS = 5,        /* D-BUS-17 */
+    PDCP_SETUP_AGAIN_MS = 5000,     /* until a device that was left is tried once more (D-BUS-17) */
+    PDCP_HOST_WAIT_MS = 1000,       /* longest wait of the host's request for its turn (D-API-10) */
     PDCP_LINK_PAUSE_MS = 500,       /* until a link that was not answered is tried again (D-BUS-26) */
     PDCP_STANDBY_HEARD_MS = 1200,   /* another arbitrator heard so soon: go silent (D-BUS-12) */
     PDCP_STANDBY_MS = 2000,         /* silent without a foreign beacon: start afresh, plus the spread */

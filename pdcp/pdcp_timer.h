@@ -14,6 +14,7 @@ enum {
     PDCP_TIMER_LIFE = PDCP_DEVICES_MAX, /* + slot: silence of a device, keeping of a lost one */
     PDCP_TIMER_BEACON = 2 * PDCP_DEVICES_MAX,
     PDCP_TIMER_LINK,     /* links that were not answered are tried again */
+    PDCP_TIMER_HOST,     /* the host's request or link has waited long enough for its turn */
     PDCP_TIMER_RECOVERY, /* the controller leaves bus-off */
     PDCP_TIMERS_MAX
 };

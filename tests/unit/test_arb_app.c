@@ -541,6 +541,61 @@ static void test_the_stored_bytes(void)
     TEST_ASSERT_EQUAL_HEX8_ARRAY(want, memory, sizeof want);
 }
 
+/* A known device binds between two pages of a write: the order of the table changes, and what is stored is
+ * still whole. */
+static void test_a_bind_between_two_pages(void)
+{
+    for (uint8_t i = 0; i < 24; i++) {
+        const pdcp_remembered_t entry = {.identity = {7, 7, (uint16_t)(100 + i)},
+                                         .node_id = (uint8_t)(0x60 + i)};
+        TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&app.arb.bind, &entry));
+    }
+    exchange_rx(&x, "650#01 0900 0900 0900");
+    (void)exchange_drain(&x);
+    exchange_pass(&x, 506); /* 500 ms, then a page each 5 ms */
+    exchange_rx(&x, "660#01 0700 0700 6400");
+    exchange_pass(&x, 400);
+    TEST_ASSERT_FALSE(app.store.changed);
+    start(false);
+    TEST_ASSERT_EQUAL(0, app.store.damaged);
+    TEST_ASSERT_EQUAL(25, app.arb.bind.remembered_count);
+}
+
+/* The host does not read for long while it sends: what could not be taken then is taken later, nothing in
+ * between is given up. */
+static void test_a_stall_of_the_host_loses_no_request(void)
+{
+    uint8_t request[8] = {0xFE, 0x19, 0x01, 0x22, 0x00, 0x00, 0x00, 0x00};
+    uint8_t stream[8 * 12];
+    for (unsigned i = 0; i < 12; i++) {
+        request[4] = (uint8_t)i;
+        request[5] = arb_host_crc8(request);
+        memcpy(&stream[8 * i], request, 8);
+    }
+    host_room = 0;
+    uint16_t taken = 0;
+    for (int ms = 0; ms < 500; ms++) {
+        const uint16_t some = (uint16_t)(sizeof stream - taken < 5 ? sizeof stream - taken : 5);
+        taken = (uint16_t)(taken + arb_app_on_bytes(&app, x.now_ms, &stream[taken], some));
+        exchange_wait(&x, 1);
+    }
+    TEST_ASSERT_LESS_THAN(sizeof stream, taken);
+    host_room = sizeof host_out;
+    for (int ms = 0; ms < 100; ms++) {
+        exchange_wait(&x, 1);
+        const uint16_t some = (uint16_t)(sizeof stream - taken < 5 ? sizeof stream - taken : 5);
+        taken = (uint16_t)(taken + arb_app_on_bytes(&app, x.now_ms, &stream[taken], some));
+        exchange_step(&x);
+    }
+    TEST_ASSERT_EQUAL(sizeof stream, taken);
+    unsigned answers = 0;
+    for (size_t at = 0; at < host_len; at += 8u + host_out[at + 6]) {
+        answers++;
+    }
+    TEST_ASSERT_EQUAL(12, answers);
+    TEST_ASSERT_EQUAL(0, app.api.rx.given_up);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -568,5 +623,7 @@ int main(void)
     RUN_TEST(test_power_may_fail_at_any_byte);
     RUN_TEST(test_a_damaged_copy_is_seen_and_not_used);
     RUN_TEST(test_the_stored_bytes);
+    RUN_TEST(test_a_bind_between_two_pages);
+    RUN_TEST(test_a_stall_of_the_host_loses_no_request);
     return UNITY_END();
 }

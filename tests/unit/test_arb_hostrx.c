@@ -190,8 +190,8 @@ static void test_the_longest_value(void)
     TEST_ASSERT_FALSE(request.too_long);
 }
 
-/* Bytes from a fixed generator, a million on a fast machine, with a correct request after every hundred: each is found once its
- * 100 ms are over. */
+/* Bytes from a fixed generator, a million on a fast machine, with a correct request after every hundred: each
+ * is found once its 100 ms are over. */
 static void test_nothing_stops_the_receiver(void)
 {
     uint32_t random = 12345;

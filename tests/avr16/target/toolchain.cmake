@@ -1,0 +1,6 @@
+# An ATmega1284P: int and pointers of 16 bits, 16 KB RAM, 128 KB flash.
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR avr)
+set(CMAKE_C_COMPILER avr-gcc)
+set(CMAKE_C_FLAGS_INIT -mmcu=atmega1284p)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)

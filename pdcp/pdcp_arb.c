@@ -54,9 +54,7 @@ static void set_life(pdcp_arb_t *arb, uint8_t node, uint32_t deadline_ms)
  */
 static void expect_life(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
-    if (node_of(arb, node)->state != PDCP_NODE_LOST) {
-        set_life(arb, node, now_ms + silence_ms(node_of(arb, node)));
-    }
+    set_life(arb, node, now_ms + silence_ms(node_of(arb, node)));
 }
 
 static void host_ends(pdcp_arb_t *arb, uint32_t now_ms, pdcp_status_t status)
@@ -256,15 +254,17 @@ static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
     }
 }
 
-/* A frame from an id that is not bound. */
-static void on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+/* A frame from an id that is not bound. True: there is something to be sent. */
+static bool on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
     const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
     count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (is_beacon && id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX && !is_young(arb, now_ms)) {
-        reset_stranger(arb, now_ms, id);
+    if (!is_beacon || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb, now_ms)) {
+        return false;
     }
+    reset_stranger(arb, now_ms, id);
+    return true;
 }
 
 /* D-BUS-12: this arbitrator falls silent; the host, if it waits, is told. */
@@ -312,22 +312,10 @@ static void on_arbitrator_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_fram
     }
 }
 
+/* The counters stand in the order of the kinds. */
 static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
 {
-    switch ((can_frame_kind_t)frame->kind) {
-    case CAN_FRAME_EXTENDED:
-        count(arb, PDCP_STAT_DROP_EXTENDED);
-        break;
-    case CAN_FRAME_REMOTE:
-        count(arb, PDCP_STAT_DROP_REMOTE);
-        break;
-    case CAN_FRAME_ERROR:
-        count(arb, PDCP_STAT_DROP_ERROR);
-        break;
-    default:
-        count(arb, PDCP_STAT_DROP_FD);
-        break;
-    }
+    count(arb, (pdcp_stat_t)(PDCP_STAT_DROP_EXTENDED + frame->kind - CAN_FRAME_EXTENDED));
 }
 
 /* True: it was the first one, or the device was lost. */
@@ -355,7 +343,7 @@ static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
         host->len = (uint16_t)(reply->offset + reply->len);
     }
-    if (host->code == PDCP_SET_PARAMETER && reply->done && reply->status == PDCP_OK && host->channel == 0) {
+    if (host->code == PDCP_SET_PARAMETER && reply->status == PDCP_OK && host->channel == 0) {
         pdcp_setup_take_time(node_of(arb, host->node), host->param, host->bytes,
                              (uint8_t)(host->size < PDCP_VALUE_MAX ? host->size : PDCP_VALUE_MAX));
         expect_life(arb, now_ms, host->node);
@@ -455,8 +443,6 @@ static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can
         count(arb, PDCP_STAT_DROP_BAD_DLC);
     } else if (is_deprecated(msg.code)) {
         count(arb, PDCP_STAT_DROP_DEPRECATED);
-    } else if (msg.code == PDCP_BEACON) {
-        (void)on_beacon(arb, now_ms, node);
     } else if (!is_from_device(msg.code)) {
         count(arb, PDCP_STAT_DROP_DIRECTION);
     } else if (msg.code == PDCP_UPDATE_CHANNEL) {
@@ -497,8 +483,7 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
     uint8_t node;
     const bool is_device = pdcp_nodes_owner(&arb->bus.nodes, pdcp_id_node(frame->id), &node);
     if (node >= PDCP_DEVICES_MAX) {
-        on_stranger(arb, now_ms, frame);
-        return true;
+        return on_stranger(arb, now_ms, frame);
     }
     node_of(arb, node)->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     if (!is_device) {

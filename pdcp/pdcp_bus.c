@@ -17,3 +17,8 @@ void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uin
     const pdcp_event_t event = {.kind = kind, .node = node, .channel = channel, .status = (int8_t)status};
     bus->on_event(bus->event_ctx, now_ms, &event);
 }
+
+void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
+{
+    bus->stats[stat]++;
+}

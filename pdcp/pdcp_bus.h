@@ -49,10 +49,7 @@ typedef struct pdcp_bus {
     void *event_ctx;
 } pdcp_bus_t;
 
-static inline void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
-{
-    bus->stats[stat]++;
-}
+void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 
 /* Puts a message from the arbitrator into the transmit queue. False: the queue is full, which is counted. */
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);

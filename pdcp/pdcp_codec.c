@@ -4,18 +4,18 @@
 #include <string.h>
 
 /* Byte offsets of one message's fields; 0 means that the field is not there, since byte 0 is the function
- * code. */
+ * code. Packed, since there are 32 rows. */
 typedef struct {
-    uint16_t dlcs;    /* bit n: DLC n is accepted */
-    uint8_t dlc_min;  /* DLC sent when the value is empty */
-    uint8_t result;   /* 1 byte */
-    uint8_t param;    /* 1 byte */
-    uint8_t channel;  /* 1 byte */
-    uint8_t node_id;  /* 1 byte */
-    uint8_t packet;   /* 1 byte */
-    uint8_t word;     /* 2 bytes */
-    uint8_t identity; /* 6 bytes */
-    uint8_t value;    /* to the end of the data */
+    unsigned dlcs : 9;     /* bit n: DLC n is accepted */
+    unsigned dlc_min : 4;  /* DLC sent when the value is empty */
+    unsigned result : 1;   /* 1 byte */
+    unsigned node_id : 1;  /* 1 byte */
+    unsigned packet : 1;   /* 1 byte */
+    unsigned param : 2;    /* 1 byte */
+    unsigned channel : 2;  /* 1 byte */
+    unsigned word : 3;     /* 2 bytes */
+    unsigned identity : 2; /* 6 bytes */
+    unsigned value : 3;    /* to the end of the data */
 } layout_t;
 
 #define DLC(n) (1u << (n))

@@ -273,13 +273,20 @@ static bool on_packet(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp
     reply->len = msg->len;
     request->packet_id++;
     request->offset = (uint16_t)(request->offset + msg->len);
+    const bool is_small = request->size <= PDCP_VALUE_MAX;
+    if (is_small) { /* a number: handed on in one piece, however it came */
+        memcpy(&request->value[reply->offset], msg->value, msg->len);
+        reply->bytes = request->value;
+        reply->len = request->offset;
+        reply->offset = 0;
+    }
     if (request->offset == request->size) {
         return finish(bus, node, PDCP_OK, reply);
     }
     request->tries_left = PDCP_TRIES - 1;
     pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node),
                     now_ms + bus->nodes.nodes[node].ack_ms);
-    return true;
+    return !is_small;
 }
 
 static bool on_packet_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
@@ -321,11 +328,8 @@ bool pdcp_request_on_message(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, con
         return on_set_size(bus, now_ms, node, msg, reply);
     case PDCP_BULK_DATA:
         return on_packet(bus, now_ms, node, msg, reply);
-    case PDCP_BULK_DATA | PDCP_ANSWER:
+    default: /* 8E: the arbitrator hands in no other */
         return on_packet_answer(bus, now_ms, node, msg, reply);
-    default:
-        late(bus);
-        return false;
     }
 }
 

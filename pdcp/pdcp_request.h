@@ -69,7 +69,7 @@ typedef struct {
     uint8_t code;  /* function code of the request */
     uint8_t param;
     uint8_t channel;
-    uint16_t offset;      /* of bytes in the value */
+    uint16_t offset;      /* of bytes in the value; values of up to 4 bytes come in one piece */
     uint16_t len;         /* bytes that came now, 0 to 6 */
     const uint8_t *bytes; /* valid during the call only */
 } pdcp_reply_t;

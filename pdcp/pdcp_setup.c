@@ -4,38 +4,33 @@
 
 typedef enum { PASS_DEVICE, PASS_SILENCE, PASS_DIRECTION, PASS_CHANNELS } pass_t;
 
-typedef struct {
-    uint8_t param;
-    bool mandatory; /* a failure answer ends the attempt; others get defaults (pdcp-bus.md 6) */
-    bool write;
-} step_t;
-
-typedef struct {
-    const step_t *steps;
-    uint8_t count;
-} steps_t;
-
-static const step_t device_steps[] = {
-    {PDCP_DEV_VID_PID, true, false},          {PDCP_DEV_SERIAL, false, false},
-    {PDCP_DEV_TYPE_PROFILE, false, false},    {PDCP_DEV_ACK_TIME, false, false},
-    {PDCP_DEV_BEACON_INTERVAL, false, false}, {PDCP_DEV_CHANNELS, true, false},
-};
-static const step_t silence_steps[] = {{PDCP_CH_ENABLED, false, true}};
-static const step_t direction_steps[] = {{PDCP_CH_TRANSFER_TYPE, true, false}};
-static const step_t input_steps[] = {
-    {PDCP_CH_TYPE_PROFILE, true, false},      {PDCP_IN_SOURCE_VID_PID, false, false},
-    {PDCP_IN_SOURCE_SERIAL, false, false},    {PDCP_IN_SOURCE_TYPE, false, false},
-    {PDCP_CH_REQUIRED, false, false},         {PDCP_CH_DESIRED, false, false},
-    {PDCP_IN_TERMINAL_PROFILE, false, false},
-};
-static const step_t output_steps[] = {
-    {PDCP_CH_TYPE_PROFILE, true, false},
-    {PDCP_CH_REQUIRED, false, false},
-    {PDCP_CH_DESIRED, false, false},
-    {PDCP_OUT_NODE_ID, true, true},
+/* A parameter, and what is to be done with it; 0 ends a list. */
+typedef uint8_t step_t;
+enum {
+    MANDATORY = 0x80, /* a failure answer ends the attempt; others get defaults (pdcp-bus.md 6) */
+    WRITE = 0x40,
+    PARAM = 0x3F
 };
 
-#define STEPS(array) ((steps_t){(array), (uint8_t)(sizeof(array) / sizeof((array)[0]))})
+static const step_t device_steps[] = {PDCP_DEV_VID_PID | MANDATORY,
+                                      PDCP_DEV_SERIAL,
+                                      PDCP_DEV_TYPE_PROFILE,
+                                      PDCP_DEV_ACK_TIME,
+                                      PDCP_DEV_BEACON_INTERVAL,
+                                      PDCP_DEV_CHANNELS | MANDATORY,
+                                      0};
+static const step_t silence_steps[] = {PDCP_CH_ENABLED | WRITE, 0};
+static const step_t direction_steps[] = {PDCP_CH_TRANSFER_TYPE | MANDATORY, 0};
+static const step_t input_steps[] = {PDCP_CH_TYPE_PROFILE | MANDATORY,
+                                     PDCP_IN_SOURCE_VID_PID,
+                                     PDCP_IN_SOURCE_SERIAL,
+                                     PDCP_IN_SOURCE_TYPE,
+                                     PDCP_CH_REQUIRED,
+                                     PDCP_CH_DESIRED,
+                                     PDCP_IN_TERMINAL_PROFILE,
+                                     0};
+static const step_t output_steps[] = {PDCP_CH_TYPE_PROFILE | MANDATORY, PDCP_CH_REQUIRED, PDCP_CH_DESIRED,
+                                      PDCP_OUT_NODE_ID | MANDATORY | WRITE, 0};
 
 /* Longest values that a setup has use for: a bit string of 256 channels. */
 #define SETUP_VALUE_MAX 32u
@@ -45,17 +40,17 @@ static pdcp_channel_t *current_channel(pdcp_bus_t *bus, uint8_t node)
     return &bus->nodes.channels[bus->nodes.nodes[node].setup_channel];
 }
 
-static steps_t steps_of(pdcp_bus_t *bus, uint8_t node)
+static const step_t *steps_of(pdcp_bus_t *bus, uint8_t node)
 {
     switch ((pass_t)bus->nodes.nodes[node].setup_pass) {
     case PASS_DEVICE:
-        return STEPS(device_steps);
+        return device_steps;
     case PASS_SILENCE:
-        return STEPS(silence_steps);
+        return silence_steps;
     case PASS_DIRECTION:
-        return STEPS(direction_steps);
+        return direction_steps;
     default:
-        return current_channel(bus, node)->transfer == PDCP_INPUT ? STEPS(input_steps) : STEPS(output_steps);
+        return current_channel(bus, node)->transfer == PDCP_INPUT ? input_steps : output_steps;
     }
 }
 
@@ -113,15 +108,15 @@ void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, u
 {
     pdcp_node_t *device = &bus->nodes.nodes[node];
     device->setup_due = false;
-    const step_t *step = &steps_of(bus, node).steps[device->setup_step];
-    if (step->write) {
-        if (!write_step(bind, bus, now_ms, node, step->param)) {
+    const step_t step = steps_of(bus, node)[device->setup_step];
+    if ((step & WRITE) != 0) {
+        if (!write_step(bind, bus, now_ms, node, (uint8_t)(step & PARAM))) {
             no_room(bus, now_ms, node);
         }
         return;
     }
     const uint8_t index = device->setup_pass == PASS_DEVICE ? 0 : current_channel(bus, node)->index;
-    pdcp_request_get(bus, now_ms, node, PDCP_CLIENT_SETUP, index, step->param, SETUP_VALUE_MAX);
+    pdcp_request_get(bus, now_ms, node, PDCP_CLIENT_SETUP, index, (uint8_t)(step & PARAM), SETUP_VALUE_MAX);
 }
 
 void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
@@ -162,7 +157,7 @@ static void go_on(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
     device->setup_step++;
     device->setup_attempts = 0;
     device->setup_due = true;
-    if (device->setup_step < steps_of(bus, node).count) {
+    if (steps_of(bus, node)[device->setup_step] != 0) {
         return;
     }
     device->setup_step = 0;
@@ -313,7 +308,7 @@ pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node
 {
     static const uint8_t nothing[1] = {0};
     const pdcp_node_t *device = &bus->nodes.nodes[node];
-    const bool mandatory = steps_of(bus, node).steps[device->setup_step].mandatory;
+    const bool mandatory = (steps_of(bus, node)[device->setup_step] & MANDATORY) != 0;
     const bool has_value = !reply->done || reply->status == PDCP_OK;
     pdcp_reply_t part = *reply;
     if (part.bytes == NULL) {

@@ -64,7 +64,7 @@ static int active_links(void)
 static uint32_t run_until_ready(void)
 {
     uint32_t waited_ms = 0;
-    while (!all_ready() && waited_ms < 60000) {
+    while (!all_ready() && waited_ms < 120000) {
         limb_run_ms(&limb, 10);
         waited_ms += 10;
         expect_unique_ids();

@@ -405,6 +405,31 @@ static void test_four_are_held_and_a_fifth_is_refused(void)
     expect_nothing();
 }
 
+/* D-API-9: the longest request and three short ones are held together; what does not fit beside them is
+ * answered like a fifth one. */
+static void test_the_longest_request_and_three_short_ones_are_held(void)
+{
+    static const uint8_t longest[ARB_HOST_REQUEST_MAX] = {DEV_OUT, 0, 7, 'x'};
+    exchange_add_output(&x, "FE");
+    ask(0x2301, 1, BYTES(DEV_OUT, 0, 8));
+    ask(0x2304, 2, longest, sizeof longest);
+    ask(0x2304, 3, longest, sizeof longest);
+    expect_error(0x2306, 3, 0x07);
+    ask(0x2301, 4, BYTES(DEV_OUT, 0, 8));
+    ask(0x2201, 5, NULL, 0);
+    expect_nothing();
+    exchange_tx(&x, "311#03 08 00");
+    exchange_rx(&x, "211#83 01 08 00 11");
+    expect(0x2302, 1, BYTES(0x11));
+    exchange_tx(&x, "311#0D 07 00 0002");
+    exchange_rx(&x, "211#8D 00 07 00 0002"); /* it has no room for 512 bytes */
+    expect_error(0x2306, 2, 0x06);
+    exchange_tx(&x, "311#03 08 00");
+    exchange_rx(&x, "211#83 01 08 00 11");
+    expect(0x2302, 4, BYTES(0x11));
+    expect(0x2202, 5, BYTES(1, 0, 1, 0));
+}
+
 /* D-API-1: strict: error 0Ch, and the request is not carried out; an unknown id stays unknown. */
 static void test_strict_checksums(void)
 {
@@ -616,6 +641,7 @@ int main(void)
     RUN_TEST(test_links_that_cannot_be);
     RUN_TEST(test_a_link_waits_for_a_running_setup);
     RUN_TEST(test_four_are_held_and_a_fifth_is_refused);
+    RUN_TEST(test_the_longest_request_and_three_short_ones_are_held);
     RUN_TEST(test_strict_checksums);
     RUN_TEST(test_a_host_that_does_not_read);
     RUN_TEST(test_identities_outlive_a_power_cycle);

@@ -51,7 +51,7 @@ static void test_a_taken_id_leads_to_a_suggestion(void)
     exchange_tx(&x, "302#81 02 0200 0200 0200");
 }
 
-/* D-BUS-2, D-BUS-6: 0 and 255 are never granted. */
+/* D-BUS-2, D-BUS-6: 0 and 255 are never granted. D-BUS-24: suggestions from 1 upwards. */
 static void test_0_and_255_get_a_suggestion(void)
 {
     exchange_rx(&x, "600#01 0100 0100 0100");

@@ -1,5 +1,5 @@
-/* The device role against frames written by hand from the tables of pdcp-bus.md. The clock starts shortly
- * before it wraps, so that every test but the shortest ones crosses 2^32. */
+/* The device role (D-BUS-16) against frames written by hand from the tables of pdcp-bus.md. The clock starts
+ * shortly before it wraps, so that every test but the shortest ones crosses 2^32. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -467,6 +467,25 @@ static void test_description_that_cannot_be_is_refused(void)
     TEST_ASSERT_FALSE(pdcp_device_init(&dev, &bad, &port, NULL, 1, now));
 }
 
+/* A random number generator of this kind never leaves 0: neither may a seed lead there. This one would. */
+static void test_no_seed_stops_the_random_ids(void)
+{
+    can_frame_t frame;
+    unsigned different = 0;
+    unsigned last = 0;
+    TEST_ASSERT_TRUE(pdcp_device_init(&dev, &desc, &port, NULL, 0x227B4C90, now));
+    for (unsigned i = 0; i < 10; i++) {
+        now = step();
+        (void)step();
+        TEST_ASSERT_TRUE(pdcp_device_tx_peek(&dev, &frame));
+        pdcp_device_tx_pop(&dev);
+        TEST_ASSERT_EQUAL_HEX16(0x600, frame.id & 0x700);
+        different += (frame.id & 0xFFu) != last ? 1u : 0u;
+        last = frame.id & 0xFFu;
+    }
+    TEST_ASSERT_TRUE(different > 7);
+}
+
 /* --- beacons --- */
 
 static void test_beacons_keep_their_interval(void)
@@ -517,6 +536,31 @@ static void test_blocked_bus_gathers_one_beacon(void)
     TX(BEACON, "0A");
     QUIET();
     TEST_ASSERT_EQUAL_UINT32(0, pdcp_device_stats(&dev)->tx_full);
+}
+
+static void test_answers_that_find_no_room_are_counted(void)
+{
+    bind_blank();
+    for (unsigned i = 0; i < PDCP_TX_MAX + 4; i++) {
+        rx(TO, "03 09 00");
+    }
+    TEST_ASSERT_EQUAL_UINT32(4, pdcp_device_stats(&dev)->tx_full);
+    advance(500); /* a beacon pushes the last one out */
+    TEST_ASSERT_EQUAL_UINT32(5, pdcp_device_stats(&dev)->tx_full);
+    TX(BEACON, "0A");
+    for (unsigned i = 0; i < PDCP_TX_MAX - 1; i++) {
+        TX(FROM, "83 01 09 00 03");
+    }
+    QUIET();
+}
+
+static void test_nothing_can_be_taken_out_of_an_empty_queue(void)
+{
+    bind_blank();
+    const uint32_t taken = pdcp_device_stats(&dev)->tx;
+    pdcp_device_tx_pop(&dev);
+    TEST_ASSERT_EQUAL_UINT32(taken, pdcp_device_stats(&dev)->tx);
+    ANSWERED("03 09 00", "83 01 09 00 03");
 }
 
 /* --- parameters --- */
@@ -600,6 +644,29 @@ static void test_source_of_an_input_is_written_and_stored(void)
     ANSWERED("03 07 01", "83 01 07 01 00 00");
 }
 
+/* Every field of the source counts, however little of it has changed. */
+static void test_any_change_of_a_source_is_stored(void)
+{
+    bind_blank();
+    ANSWERED("04 06 01 0B00 04", "84 01 06 01 0B00 04");
+    ANSWERED("04 08 01 0050 2021", "84 01 08 01 0050 2021");
+    TEST_ASSERT_EQUAL_UINT(2, seen.stores);
+    ANSWERED("04 06 01 0B00 05", "84 01 06 01 0B00 05");
+    TEST_ASSERT_EQUAL_UINT(3, seen.stores);
+    TEST_ASSERT_EQUAL_UINT8(5, seen.record.sources[0].channel);
+    ANSWERED("04 08 01 0050 2022", "84 01 08 01 0050 2022");
+    TEST_ASSERT_EQUAL_UINT(4, seen.stores);
+    TEST_ASSERT_EQUAL_HEX16(0x2220, seen.record.sources[0].profile);
+}
+
+/* D-BUS-2: 255 is nobody's id. */
+static void test_a_source_cannot_have_id_255(void)
+{
+    bind_blank();
+    ANSWERED("04 07 01 FF 21", "84 00 07 01 FF 21");
+    ANSWERED("03 07 01", "83 01 07 01 00 00");
+}
+
 static void test_short_values_are_filled_with_zero_and_long_ones_cut(void)
 {
     bind_blank();
@@ -656,6 +723,26 @@ static void test_extras_are_read_and_written(void)
     ANSWERED("04 51 00 01", "84 00 51 00 01");
     gain_len = 5;
     ANSWERED("03 50 03", "83 02 50 03");
+}
+
+static void test_a_value_longer_than_its_extra_is_refused(void)
+{
+    pdcp_device_extra_t narrow = extras[0];
+    pdcp_device_desc_t other = desc;
+    const pdcp_device_record_t record = blank_record(ID);
+    narrow.capacity = 2;
+    other.extras = &narrow;
+    other.extra_count = 1;
+    TEST_ASSERT_TRUE(pdcp_device_init(&dev, &other, &port, &record, 1, now));
+    (void)step();
+    TX(BIND, "01 0200 0300 0400");
+    rx(TO, "81 10 0200 0300 0400");
+    TX(BEACON, "0A");
+    ANSWERED("04 50 03 0A0B0C", "84 00 50 03 0A0B0C");
+    TEST_ASSERT_EQUAL_UINT(0, seen.written);
+    ANSWERED("03 50 03", "83 01 50 03 07");
+    ANSWERED("04 50 03 0A0B", "84 01 50 03 0A0B");
+    TEST_ASSERT_EQUAL_UINT(1, seen.written);
 }
 
 /* --- malformed and foreign frames --- */
@@ -728,6 +815,20 @@ static void test_data_comes_only_from_the_source_of_an_enabled_input(void)
     TEST_ASSERT_EQUAL_UINT(3, seen.inputs);
     TEST_ASSERT_EQUAL_UINT32(3, pdcp_device_stats(&dev)->data_in);
     QUIET();
+}
+
+/* A DLC above 8 means 8 bytes of data and is cut by the driver (can_frame.h); one that is not is no data. */
+static void test_data_of_more_than_8_bytes_is_not_taken(void)
+{
+    can_frame_t frame = frame_of(0x021, "0102030405060708");
+    bind_blank();
+    link_all();
+    frame.dlc = 9;
+    pdcp_device_on_frame(&dev, now, &frame);
+    TEST_ASSERT_EQUAL_UINT(0, seen.inputs);
+    frame.dlc = 8;
+    pdcp_device_on_frame(&dev, now, &frame);
+    TEST_ASSERT_EQUAL_UINT(1, seen.inputs);
 }
 
 static void test_one_output_feeds_two_inputs(void)
@@ -934,6 +1035,22 @@ static void test_stored_sources_are_asked_for_until_answered(void)
     TEST_ASSERT_EQUAL_UINT32(4, pdcp_device_stats(&dev)->drop_late);
 }
 
+/* D-BUS-7: unconnected is FFFF, FFFF, FFFF and FF together. One of them alone says nothing. */
+static void test_a_source_is_unconnected_only_as_a_whole(void)
+{
+    for (unsigned field = 0; field < 4; field++) {
+        pdcp_device_record_t record = blank_record(ID);
+        pdcp_device_source_t *source = &record.sources[0];
+        source->identity.vid = field == 0 ? 2 : 0xFFFF;
+        source->identity.pid = field == 1 ? 2 : 0xFFFF;
+        source->identity.sn = field == 2 ? 2 : 0xFFFF;
+        source->channel = field == 3 ? 2 : 0xFF;
+        bind_with(&record);
+        TX(FROM, "0F 01");
+        QUIET();
+    }
+}
+
 static void test_input_that_is_unconnected_meanwhile_is_not_asked_for(void)
 {
     const pdcp_device_record_t record = linked_record();
@@ -1058,6 +1175,35 @@ static void test_disabled_terminal_input_becomes_safe(void)
     TEST_ASSERT_EQUAL_UINT(1, seen.safes);
     ANSWERED("04 04 02 00", "84 01 04 02 00"); /* was so already */
     TEST_ASSERT_EQUAL_UINT(1, seen.safes);
+}
+
+/* pdcp_device.h: every function of the port may be NULL. */
+static void test_a_device_without_an_application(void)
+{
+    static const pdcp_device_port_t none = {0};
+    static const uint8_t data[1] = {9};
+    TEST_ASSERT_TRUE(pdcp_device_init(&dev, &desc, &none, NULL, 1, now));
+    (void)step();
+    can_frame_t request;
+    TEST_ASSERT_TRUE(pdcp_device_tx_peek(&dev, &request));
+    pdcp_device_tx_pop(&dev);
+    rx(0x300u | (request.id & 0xFFu), "81 10 0200 0300 0400"); /* id 10h is suggested, stored nowhere */
+    TX(BIND, "01 0200 0300 0400");
+    rx(TO, "81 10 0200 0300 0400");
+    TX(BEACON, "0A");
+    ANSWERED("04 05 01 0200 0900", "84 01 05 01 0200 0900");
+    ANSWERED("04 50 03 01", "84 01 50 03 01");
+    link_all();
+    rx(0x021, "0102");
+    rx(0x022, "0102");
+    TEST_ASSERT_EQUAL_UINT32(2, pdcp_device_stats(&dev)->data_in);
+    TEST_ASSERT_TRUE(pdcp_device_send(&dev, now, 3, data, 1));
+    TX(0x023, "09");
+    ANSWERED("04 04 02 00", "84 01 04 02 00"); /* a terminal input */
+    rx(TO, "0B");
+    TX(FROM, "8B 01");
+    TX(BIND, "01 0200 0300 0400");
+    TEST_ASSERT_EQUAL_INT(PDCP_DEVICE_ASKING, pdcp_device_state(&dev));
 }
 
 /* --- bulk get --- */
@@ -1265,6 +1411,22 @@ static void test_bulk_set_is_refused_at_configure_time(void)
     TEST_ASSERT_EQUAL_UINT(0, seen.written);
 }
 
+/* What can be written at all can be written by bulk, and nothing else (pdcp-bus.md 4). */
+static void test_bulk_set_of_channel_parameters(void)
+{
+    bind_blank();
+    ANSWERED("0D 03 01 0100", "8D 00 03 01 0100"); /* transfer type */
+    ANSWERED("0D 09 01 0100", "8D 00 09 01 0100"); /* required channels */
+    ANSWERED("0D 06 03 0100", "8D 00 06 03 0100"); /* not specified for outputs */
+    ANSWERED("0D 04 03 0100", "8D 01 04 03 0100");
+    ANSWERED("0E 00 01", "8E 01");
+    ANSWERED("03 04 03", "83 01 04 03 01");
+    ANSWERED("0D 05 03 0100", "8D 01 05 03 0100");
+    ANSWERED("0E 00 23", "8E 01");
+    ANSWERED("03 05 03", "83 01 05 03 23");
+    ANSWERED("0D 0D 00 0100", "8D 00 0D 00 0100"); /* behind the last parameter of the device */
+}
+
 static void test_bulk_set_without_a_buffer_and_of_nothing(void)
 {
     pdcp_device_desc_t small = desc;
@@ -1316,19 +1478,26 @@ int main(void)
     RUN_TEST(test_unbound_device_answers_nothing);
     RUN_TEST(test_unreadable_record_is_taken_as_none);
     RUN_TEST(test_description_that_cannot_be_is_refused);
+    RUN_TEST(test_no_seed_stops_the_random_ids);
     RUN_TEST(test_beacons_keep_their_interval);
     RUN_TEST(test_beacon_interval_can_be_changed_within_its_limits);
     RUN_TEST(test_blocked_bus_gathers_one_beacon);
+    RUN_TEST(test_answers_that_find_no_room_are_counted);
+    RUN_TEST(test_nothing_can_be_taken_out_of_an_empty_queue);
     RUN_TEST(test_device_parameters);
     RUN_TEST(test_input_parameters_after_power_on);
     RUN_TEST(test_output_parameters);
     RUN_TEST(test_source_of_an_input_is_written_and_stored);
+    RUN_TEST(test_any_change_of_a_source_is_stored);
+    RUN_TEST(test_a_source_cannot_have_id_255);
     RUN_TEST(test_short_values_are_filled_with_zero_and_long_ones_cut);
     RUN_TEST(test_read_only_parameters_stay);
     RUN_TEST(test_times_have_limits);
     RUN_TEST(test_extras_are_read_and_written);
+    RUN_TEST(test_a_value_longer_than_its_extra_is_refused);
     RUN_TEST(test_malformed_frames_are_counted_and_not_answered);
     RUN_TEST(test_data_comes_only_from_the_source_of_an_enabled_input);
+    RUN_TEST(test_data_of_more_than_8_bytes_is_not_taken);
     RUN_TEST(test_one_output_feeds_two_inputs);
     RUN_TEST(test_output_sends_with_its_node_id_when_enabled);
     RUN_TEST(test_data_leaves_room_for_answers);
@@ -1339,6 +1508,7 @@ int main(void)
     RUN_TEST(test_reset_answers_and_binds_anew);
     RUN_TEST(test_reset_drops_what_waits);
     RUN_TEST(test_stored_sources_are_asked_for_until_answered);
+    RUN_TEST(test_a_source_is_unconnected_only_as_a_whole);
     RUN_TEST(test_input_that_is_unconnected_meanwhile_is_not_asked_for);
     RUN_TEST(test_every_source_is_asked_for_though_the_queue_is_small);
     RUN_TEST(test_silence_is_among_the_deadlines);
@@ -1346,6 +1516,7 @@ int main(void)
     RUN_TEST(test_devices_are_no_sign_of_an_arbitrator);
     RUN_TEST(test_answers_while_alone_come_with_the_arbitrator);
     RUN_TEST(test_disabled_terminal_input_becomes_safe);
+    RUN_TEST(test_a_device_without_an_application);
     RUN_TEST(test_bulk_get_of_a_descriptor);
     RUN_TEST(test_bulk_get_of_required_inputs_ends_with_a_short_packet);
     RUN_TEST(test_bulk_get_of_short_and_of_missing_values);
@@ -1359,6 +1530,7 @@ int main(void)
     RUN_TEST(test_bulk_set_wrong_packet_fails_until_configured_anew);
     RUN_TEST(test_bulk_set_started_anew_begins_with_packet_0);
     RUN_TEST(test_bulk_set_is_refused_at_configure_time);
+    RUN_TEST(test_bulk_set_of_channel_parameters);
     RUN_TEST(test_bulk_set_without_a_buffer_and_of_nothing);
     RUN_TEST(test_bulk_set_of_a_value_that_cannot_be);
     RUN_TEST(test_requests_are_answered_during_a_transfer);

@@ -83,8 +83,8 @@ static void test_what_cannot_be_a_link(void)
     TEST_ASSERT_EQUAL(PDCP_ERR_BUSY, pdcp_arb_connect(x.arb, output(), input()));
 }
 
-/* What undoes a link that failed at a step: the steps before it and the step itself, in reverse (the refused
- * write may have been carried out). */
+/* D-BUS-21: what undoes a link that failed at a step: the steps before it and the step itself, in reverse
+ * (the refused write may have been carried out). */
 static const exchange_pair_t undoing[] = {
     {"312#04 05 01 FFFF FFFF", "212#84 01 05 01 FFFF FFFF"},
     {"312#04 06 01 FFFF FF", "212#84 01 06 01 FFFF FF"},
@@ -160,7 +160,7 @@ static void test_an_input_without_parameter_8_is_linked(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
 }
 
-/* A device that falls silent in the middle: the failed write is undone with one try, not three. */
+/* D-BUS-21: a device falls silent in the middle: the failed write is undone with one try, not three. */
 static void test_silence_in_the_middle_ends_the_link(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));

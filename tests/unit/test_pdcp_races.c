@@ -274,6 +274,41 @@ static void test_a_device_that_was_left_is_tried_again(void)
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SETUP_FAILED));
 }
 
+/* A number that comes by bulk transfer, in whatever pieces, is one number. */
+static void test_a_number_in_pieces(void)
+{
+    exchange_rx(&x, "613#01 3412 7856 BC9A");
+    exchange_tx(&x, "313#81 13 3412 7856 BC9A");
+    exchange_tx(&x, "313#03 01 00");
+    exchange_rx(&x, "213#83 02 01 00");
+    exchange_tx(&x, "313#0C 01 00");
+    exchange_rx(&x, "213#8C 01 01 00 0400");
+    exchange_rx(&x, "213#0E 00 34");
+    exchange_tx(&x, "313#8E 01");
+    exchange_rx(&x, "213#0E 01 1278");
+    exchange_tx(&x, "313#8E 01");
+    exchange_rx(&x, "213#0E 02 56");
+    exchange_tx(&x, "313#8E 01");
+    exchange_tx(&x, "313#03 02 00"); /* VID and PID match the binding */
+}
+
+static void test_a_source_in_pieces(void)
+{
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 02 05 01");
+    exchange_tx(&x, "312#0C 05 01");
+    exchange_rx(&x, "212#8C 01 05 01 0400");
+    exchange_rx(&x, "212#0E 00 020002");
+    exchange_tx(&x, "312#8E 01");
+    exchange_rx(&x, "212#0E 01 00");
+    exchange_tx(&x, "312#8E 01");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_pairs(&x, to_the_input);
+    exchange_tx(&x, "311#04 04 01 01");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -289,5 +324,7 @@ int main(void)
     RUN_TEST(test_an_update_that_could_not_be_read_is_not_refused);
     RUN_TEST(test_a_reset_device_is_checked_once);
     RUN_TEST(test_a_device_that_was_left_is_tried_again);
+    RUN_TEST(test_a_number_in_pieces);
+    RUN_TEST(test_a_source_in_pieces);
     return UNITY_END();
 }

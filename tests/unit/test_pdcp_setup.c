@@ -30,8 +30,8 @@ static void bind_device(void)
     exchange_tx(&x, "311#81 11 0200 0200 0500");
 }
 
-/* A controller with two inputs and an output, every parameter supported: the whole exchange in its order.
- * D-BUS-24: the first output gets id FEh. */
+/* D-BUS-27. A controller with two inputs and an output, every parameter supported: the whole exchange in its
+ * order. D-BUS-24: the first output gets id FEh. */
 static void test_everything_is_read_and_written_in_order(void)
 {
     static const exchange_pair_t pairs[] = {

@@ -611,7 +611,7 @@ static void test_socketcand_server_slow_reader_loses_whole_frames_and_they_are_c
     close(slow);
 }
 
-/* python-can reads the answer to rawmode with one recv and takes nothing else along with it. */
+/* D-SIM-2: python-can reads the answer to rawmode with one recv and takes nothing else along with it. */
 static void test_socketcand_server_holds_frames_after_rawmode(void)
 {
     static const can_frame_t frame = {.id = 0x005};

@@ -714,6 +714,17 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
     return pdcp_link_wish(&arb->link, output, input) ? PDCP_OK : PDCP_ERR_BUSY;
 }
 
+bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
+{
+    const pdcp_channel_t *channels = arb->bus.nodes.channels;
+    if (input >= PDCP_CHANNELS_MAX || channels[input].node == PDCP_NONE ||
+        channels[input].link == PDCP_LINK_NONE) {
+        return false;
+    }
+    pdcp_link_remove(&arb->link, &arb->bus, input);
+    return true;
+}
+
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {

@@ -85,6 +85,10 @@ pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8
  * way. */
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input);
 
+/* Takes the link of an input away (pdcp-bus.md 8); PDCP_EVENT_LINK tells when that is done. False: it has
+ * none. */
+bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input);
+
 /* Suspend (time_ms: 0 = until released) or Release for one device, as a request of the host: answers and
  * outcome as with pdcp_arb_get. */
 pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint16_t time_ms);

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "exchange.h"
+#include "pdcp_device.h"
 #include "unity.h"
 
 #ifdef __AVR__
@@ -364,6 +365,60 @@ static void test_a_link_job_with_every_outcome_at_every_step(void)
     }
 }
 
+/* A hand with one input, for the device role. */
+static const pdcp_device_channel_desc_t one_input[] = {
+    {.direction = PDCP_INPUT, .terminal = true, .type = 0x5300, .profile = 0x1110}};
+static const pdcp_device_desc_t hand = {.identity = {2, 2, 6}, .channels = one_input, .channel_count = 1};
+static const pdcp_device_port_t no_port = {.ctx = NULL};
+
+static void device_in_state(pdcp_device_t *device, pdcp_device_state_t state)
+{
+    const can_frame_t granted = {.id = 0x312, .dlc = 8, .data = {0x81, 0x12, 2, 0, 2, 0, 6, 0}};
+    const pdcp_device_record_t record = {.node_id = 0x12};
+    TEST_ASSERT_TRUE(pdcp_device_init(device, &hand, &no_port, &record, 1, 0));
+    (void)pdcp_device_step(device, 0);
+    if (state != PDCP_DEVICE_ASKING) {
+        pdcp_device_on_frame(device, 0, &granted);
+    }
+    if (state == PDCP_DEVICE_ALONE) {
+        (void)pdcp_device_step(device, 3000);
+    }
+    TEST_ASSERT_EQUAL(state, pdcp_device_state(device));
+}
+
+/* Frames that lead a device into another state: its grant, its reset, and, when it is alone, anything from an
+ * arbitrator. */
+static bool moves(pdcp_device_state_t state, uint16_t id, uint8_t code)
+{
+    const bool from_arbitrator = (id & 0x100u) != 0 && (id >> 9) != 3;
+    return from_arbitrator && (state == PDCP_DEVICE_ALONE || (state == PDCP_DEVICE_BOUND && code == 0x0B));
+}
+
+/* The device role in each of its states: no other frame changes its state, its id, or what its input listens
+ * to. */
+static void test_no_frame_moves_a_device_unasked(void)
+{
+    static pdcp_device_t device;
+    for (int state = PDCP_DEVICE_ASKING; state <= PDCP_DEVICE_ALONE; state++) {
+        device_in_state(&device, (pdcp_device_state_t)state);
+        const uint8_t node_id = pdcp_device_node_id(&device);
+        for (uint16_t id = 0; id <= CAN_FRAME_ID_MAX; id = (uint16_t)(id + ID_STEP)) {
+            for (uint16_t code = 0; code < 256; code = (uint16_t)(code + CODE_STEP)) {
+                for (uint8_t dlc = 0; dlc <= 8; dlc++) {
+                    const can_frame_t frame = {.id = id, .dlc = dlc, .data = {dlc > 0 ? (uint8_t)code : 0}};
+                    if (!moves((pdcp_device_state_t)state, id, (uint8_t)code)) {
+                        pdcp_device_on_frame(&device, 3000, &frame);
+                        device.txq.count = 0;
+                    }
+                }
+            }
+            TEST_ASSERT_EQUAL(state, pdcp_device_state(&device));
+            TEST_ASSERT_EQUAL_HEX8(node_id, pdcp_device_node_id(&device));
+            TEST_ASSERT_FALSE(pdcp_device_channel(&device, 1)->enabled);
+        }
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -371,5 +426,6 @@ int main(void)
     RUN_TEST(test_on_standby_every_frame_is_classified);
     RUN_TEST(test_the_request_machine_over_all_states_and_events);
     RUN_TEST(test_a_link_job_with_every_outcome_at_every_step);
+    RUN_TEST(test_no_frame_moves_a_device_unasked);
     return UNITY_END();
 }

@@ -198,7 +198,9 @@ static void test_a_link_is_removed(void)
         {NULL, NULL},
     };
     make_link();
-    pdcp_link_remove(&x.arb->link, &x.arb->bus, input());
+    TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, output()));
+    TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, PDCP_NONE));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
     exchange_run(&x, removing);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
     TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));

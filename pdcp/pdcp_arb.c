@@ -210,7 +210,7 @@ static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *f
 /* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
 static bool is_young(pdcp_arb_t *arb, uint32_t now_ms)
 {
-    arb->young = arb->young && pdcp_time_before(now_ms, arb->started_ms + PDCP_STRANGER_QUIET_MS);
+    arb->young = arb->young && pdcp_time_before(now_ms, arb->started_ms + PDCP_YOUNG_MS);
     return arb->young;
 }
 
@@ -223,26 +223,19 @@ static void forget_strangers(pdcp_arb_t *arb, uint32_t now_ms)
     }
 }
 
-static pdcp_stranger_t *free_stranger(pdcp_arb_t *arb, uint32_t now_ms)
-{
-    forget_strangers(arb, now_ms);
-    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (arb->strangers[i].node_id == 0) {
-            return &arb->strangers[i];
-        }
-    }
-    return NULL;
-}
-
 /* Tells the device with this id to reset, at most once a second (D-BUS-15). It will then bind. */
 static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
 {
+    pdcp_stranger_t *entry = NULL;
+    forget_strangers(arb, now_ms);
     for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (arb->strangers[i].node_id == id && pdcp_time_before(now_ms, arb->strangers[i].until_ms)) {
+        if (arb->strangers[i].node_id == id) {
             return;
         }
+        if (arb->strangers[i].node_id == 0) {
+            entry = &arb->strangers[i];
+        }
     }
-    pdcp_stranger_t *entry = free_stranger(arb, now_ms);
     if (entry == NULL) {
         return; /* its turn comes within a second: nobody is told twice */
     }

@@ -46,7 +46,7 @@ typedef struct {
     pdcp_host_request_t host;
     pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
     uint32_t started_ms; /* means something while young */
-    bool young;          /* in its first PDCP_STRANGER_QUIET_MS */
+    bool young;          /* in its first PDCP_YOUNG_MS */
     uint32_t foreign_ms; /* when another arbitrator was heard last */
     uint16_t spread_ms;  /* of the standby, from the serial number */
     bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */

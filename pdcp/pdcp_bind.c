@@ -122,10 +122,10 @@ void pdcp_bind_on_time(pdcp_bind_t *bind, uint32_t now_ms)
 
 static void release_reserved(pdcp_bind_t *bind, uint32_t now_ms, const pdcp_identity_t *identity)
 {
+    pdcp_bind_on_time(bind, now_ms);
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
-        pdcp_reserved_t *entry = &bind->reserved[i];
-        if (pdcp_time_reached(now_ms, entry->until_ms) || pdcp_identity_equal(&entry->identity, identity)) {
-            entry->node_id = 0;
+        if (pdcp_identity_equal(&bind->reserved[i].identity, identity)) {
+            bind->reserved[i].node_id = 0;
         }
     }
 }

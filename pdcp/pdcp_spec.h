@@ -96,13 +96,13 @@ enum {
     PDCP_SETUP_AGAIN_MS = 5000,     /* until a device that was left is tried once more (D-BUS-17) */
     PDCP_HOST_WAIT_MS = 1000,       /* longest wait of the host's request for its turn (D-API-10) */
     PDCP_LINK_PAUSE_MS = 500,       /* until a link that was not answered is tried again (D-BUS-26) */
-    PDCP_STANDBY_HEARD_MS = 1200,   /* another arbitrator heard so soon: go silent (D-BUS-12) */
     PDCP_STANDBY_MS = 2000,         /* silent without a foreign beacon: start afresh, plus the spread */
     PDCP_STANDBY_SPREAD_MS = 1000,  /* by serial number (D-BUS-12) */
     PDCP_RECOVERY_MS = 100,         /* first pause before leaving bus-off, doubling */
     PDCP_RECOVERY_MAX_MS = 5000,
-    PDCP_STRANGER_QUIET_MS = 1200, /* no Reset to strangers so soon after our start (D-BUS-15) */
-    PDCP_STRANGER_PAUSE_MS = 1000  /* between two Resets to the same id (D-BUS-15) */
+    PDCP_YOUNG_MS = 1200,         /* first time of an arbitrator: no Reset to strangers (D-BUS-15), and silent
+                                     when another is heard (D-BUS-12) */
+    PDCP_STRANGER_PAUSE_MS = 1000 /* between two Resets to the same id (D-BUS-15) */
 };
 
 /* VID, PID and serial number: who a device is [PDCP 3.2.1]. */

@@ -2,22 +2,12 @@
 
 #include <string.h>
 
+#include "arb_crc.h"
 #include "pdcp_codec.h"
 #include "pdcp_time.h"
 
-/* CRC-32 as Ethernet has it, reflected, polynomial EDB88320h. */
-static uint32_t crc32_byte(uint32_t crc, uint8_t byte)
-{
-    crc ^= byte;
-    for (uint8_t bit = 0; bit < 8; bit++) {
-        const bool low = (crc & 1u) != 0;
-        crc >>= 1;
-        if (low) {
-            crc ^= 0xEDB88320uL;
-        }
-    }
-    return crc;
-}
+/* A larger table needs another layout: a negative array size does not compile. */
+typedef char arb_store_fits_its_place[ARB_STORE_AREAS * ARB_STORE_AREA <= ARB_NVM_FLAGS_AT ? 1 : -1];
 
 static uint16_t area_address(uint8_t area)
 {
@@ -53,9 +43,10 @@ static uint8_t body_byte(const pdcp_bind_t *bind, uint16_t sequence, uint16_t at
 
 static uint32_t body_crc(const pdcp_bind_t *bind, uint16_t sequence)
 {
-    uint32_t crc = 0xFFFFFFFFuL;
+    uint32_t crc = ARB_CRC32_INIT;
     for (uint16_t at = 0; at < body_length(bind->remembered_count); at++) {
-        crc = crc32_byte(crc, body_byte(bind, sequence, at));
+        const uint8_t byte = body_byte(bind, sequence, at);
+        crc = arb_crc32(crc, &byte, 1);
     }
     return ~crc;
 }
@@ -73,17 +64,16 @@ static area_state_t check_area(const arb_port_t *port, uint8_t area, uint8_t hea
         header[3] > PDCP_IDENTITIES_MAX) {
         return AREA_DAMAGED;
     }
-    /* Over a message and its own CRC-32 the register ends at this residue. */
-    uint32_t crc = 0xFFFFFFFFuL;
+    uint32_t crc = ARB_CRC32_INIT;
     const uint16_t end = (uint16_t)(body_length(header[3]) + ARB_STORE_CRC);
     for (uint16_t at = 0; at < end; at++) {
         uint8_t byte;
         if (!port->nvm_read(port->ctx, (uint16_t)(area_address(area) + at), &byte, 1)) {
             return AREA_DAMAGED;
         }
-        crc = crc32_byte(crc, byte);
+        crc = arb_crc32(crc, &byte, 1);
     }
-    return crc == 0xDEBB20E3uL ? AREA_GOOD : AREA_DAMAGED;
+    return crc == ARB_CRC32_RESIDUE ? AREA_GOOD : AREA_DAMAGED;
 }
 
 static void load_entries(const arb_port_t *port, uint8_t area, uint8_t count, pdcp_bind_t *bind)
@@ -128,10 +118,24 @@ void arb_store_load(arb_store_t *store, const arb_port_t *port, pdcp_bind_t *bin
     }
 }
 
+void arb_store_share(arb_store_t *store, arb_nvm_t *nvm)
+{
+    store->nvm = nvm;
+}
+
+/* The memory is not written to for now. */
+static void stop_writing(arb_store_t *store)
+{
+    store->writing = false;
+    if (store->nvm != NULL) {
+        arb_nvm_give(store->nvm, ARB_NVM_STORE);
+    }
+}
+
 void arb_store_touch(arb_store_t *store, uint32_t now_ms)
 {
     store->changed = true;
-    store->writing = false; /* a copy under way is out of date: its area is written from the start */
+    stop_writing(store); /* a copy under way is out of date: its area is written from the start */
     store->due_ms = now_ms + ARB_STORE_DELAY_MS;
 }
 
@@ -174,7 +178,7 @@ static bool write_page(arb_store_t *store, const arb_port_t *port, const pdcp_bi
 static void retry_later(arb_store_t *store, uint32_t now_ms)
 {
     store->failures++;
-    store->writing = false;
+    stop_writing(store);
     store->due_ms = now_ms + ARB_STORE_DELAY_MS;
 }
 
@@ -183,8 +187,11 @@ void arb_store_step(arb_store_t *store, const arb_port_t *port, const pdcp_bind_
     if (!store->changed || pdcp_time_before(now_ms, store->due_ms)) {
         return;
     }
+    store->due_ms = now_ms + ARB_NVM_POLL_MS;
+    if (store->nvm != NULL && !arb_nvm_take(store->nvm, ARB_NVM_STORE)) {
+        return;
+    }
     const int8_t status = port->nvm_status(port->ctx);
-    store->due_ms = now_ms + ARB_STORE_POLL_MS;
     if (status > 0) {
         return;
     }
@@ -198,7 +205,7 @@ void arb_store_step(arb_store_t *store, const arb_port_t *port, const pdcp_bind_
     if (store->written == body_length(bind->remembered_count) + ARB_STORE_CRC) {
         store->sequence++;
         store->area = next_area(store);
-        store->writing = false;
+        stop_writing(store);
         store->changed = false;
     } else if (!write_page(store, port, bind)) {
         retry_later(store, now_ms);

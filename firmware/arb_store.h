@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arb_port.h"
+#include "arb_nvm.h"
 #include "pdcp_bind.h"
 
 enum {
@@ -24,8 +24,7 @@ enum {
     ARB_STORE_ENTRY = 7,
     ARB_STORE_CRC = 4,
     ARB_STORE_AREAS = 2,
-    ARB_STORE_DELAY_MS = 500, /* after the last change: one write for a limb that powers up */
-    ARB_STORE_POLL_MS = 5     /* a page of an EEPROM takes so long */
+    ARB_STORE_DELAY_MS = 500 /* after the last change: one write for a limb that powers up */
 };
 
 /* Bytes of one area, whole pages. */
@@ -35,6 +34,7 @@ enum {
      ARB_PORT_NVM_PAGE)
 
 typedef struct {
+    arb_nvm_t *nvm;    /* who may write to the memory; NULL: the table alone does */
     uint16_t sequence; /* of the newest good copy */
     uint8_t area;      /* where it stands; ARB_STORE_AREAS: there is none */
     bool changed;      /* the table is newer than the copy */
@@ -48,6 +48,9 @@ typedef struct {
 
 /* Reads the newest good copy into bind, which must be empty. */
 void arb_store_load(arb_store_t *store, const arb_port_t *port, pdcp_bind_t *bind);
+
+/* Others write to the memory, too: from now on the table waits for its turn. nvm must outlive the store. */
+void arb_store_share(arb_store_t *store, arb_nvm_t *nvm);
 
 /* The table has changed: it is written ARB_STORE_DELAY_MS after the last change. */
 void arb_store_touch(arb_store_t *store, uint32_t now_ms);

@@ -1,0 +1,160 @@
+/* Keeps the stored configurations (profile-layer.md 5) over a power cycle.
+ *
+ * The string of profile_tlv.h stands in two areas of the memory that are written in turn: a write never
+ * touches the newest good copy, and the header is written last, so that power may fail at any byte and either
+ * the old or the new string is there afterwards. One area, from its first byte:
+ *
+ *   byte   0   1   2       3   4    5    6       7       8 .. 11   64 ..
+ *          'P' 'C' version 0   seq  seq  length  length  CRC-32    string
+ *
+ * seq counts writes, length is that of the string, all LSB first; the CRC-32 is that of the string followed
+ * by bytes 0 to 7. A memory that holds nothing good reads as a string without configurations (1 0, 15 0), so
+ * that whatever is read can be written back.
+ *
+ * One job at a time: it is started by a function below, carried on by arb_config_step in small steps (one
+ * page written or ARB_CONFIG_READ_MAX bytes read), and ends with a call of done. What is already stored is
+ * not written. What is written is read back and checked before its header makes it the newest copy. */
+#ifndef ARB_CONFIG_H
+#define ARB_CONFIG_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "arb_nvm.h"
+#include "profile_tlv.h"
+
+enum {
+    ARB_CONFIG_VERSION = 1,
+    ARB_CONFIG_HEADER = 12,
+    ARB_CONFIG_AREAS = 2,
+    ARB_CONFIG_AREA = 8192,       /* bytes of an area */
+    ARB_CONFIG_STRING_MAX = 7680, /* longest string: 8 configurations of 16 links take 7350 */
+    ARB_CONFIG_READ_MAX = 128,    /* bytes read at a time: 3.2 ms at a 24LC256 */
+    ARB_CONFIG_PACE_MS = 1,       /* between two reads: the bus goes on */
+    ARB_CONFIG_POLLS_MAX = 50     /* a job that waits longer for the memory, 250 ms, has failed */
+};
+
+/* How a start or a job ended; 0 or more is good. */
+typedef enum {
+    ARB_CONFIG_OK = 0,           /* a start: it is under way, done will be called; a job: done */
+    ARB_CONFIG_UNCHANGED = 1,    /* a job: done, nothing had to be written */
+    ARB_CONFIG_ERR_BUSY = -1,    /* a start: a job is under way; try again later */
+    ARB_CONFIG_ERR_STORAGE = -2, /* too long for an area, or the memory has failed: nothing has changed */
+    ARB_CONFIG_ERR_VALUE = -3,   /* a piece out of order, or a string that profile_tlv.h rejects */
+    ARB_CONFIG_ERR_NUMBER = -4   /* no such configuration */
+} arb_config_status_t;
+
+/* A job is over. Called once for every start that returned ARB_CONFIG_OK, from arb_config_step; may start the
+ * next job. */
+typedef void (*arb_config_done_t)(void *ctx, arb_config_status_t status);
+
+/* Gives link k, from 0, of the configuration to be saved. Called several times for each link, in any order;
+ * what it gives must stay the same until the job is over. */
+typedef void (*arb_config_link_t)(void *ctx, uint8_t k, profile_link_t *link);
+
+/* Counters since the start, in the order of the host's statistics group 2. */
+typedef enum {
+    ARB_CONFIG_PAGES,           /* pages written, those of a write that failed later as well */
+    ARB_CONFIG_WRITES,          /* strings stored: saves, erasures, writes by the host */
+    ARB_CONFIG_COUNT_UNCHANGED, /* the same, but nothing had to be written */
+    ARB_CONFIG_FAILURES,        /* jobs that ended with ARB_CONFIG_ERR_STORAGE */
+    ARB_CONFIG_DAMAGED, /* areas that were neither empty nor good at the start: bit rot or a cut write */
+    ARB_CONFIG_COUNTERS
+} arb_config_counter_t;
+
+typedef struct {
+    uint32_t counters[ARB_CONFIG_COUNTERS];
+    /* What is stored. */
+    uint8_t numbers[PROFILE_TLV_SET_BYTES]; /* of the configurations, a bit for each (profile_tlv_has) */
+    uint8_t stored;                         /* how many there are */
+    uint8_t area;                           /* where the newest good copy stands; ARB_CONFIG_AREAS: nowhere */
+    uint16_t sequence;                      /* of that copy */
+    uint16_t length;
+    uint32_t crc; /* register behind the string */
+    /* The job. */
+    uint8_t kind; /* what it is, what it is at: private to arb_config.c */
+    uint8_t phase;
+    bool writing;   /* a page is under way */
+    uint8_t polls;  /* of a memory that is not ready */
+    uint8_t number; /* save, erase */
+    uint8_t count;  /* save: links */
+    bool same;      /* the new configuration is the stored one so far */
+    uint16_t at;    /* where in the string it reads, or in the new one it writes */
+    uint16_t length_new;
+    uint16_t count_at; /* where in the stored string the number of configurations stands, */
+    uint16_t cut_from; /* what of it is replaced, */
+    uint16_t cut_to;
+    uint16_t end_at;   /* and where its end stands */
+    uint32_t crc_new;  /* registers: of the new string, */
+    uint32_t crc_read; /* of what was read */
+    uint32_t due_ms;
+    arb_config_link_t link;
+    arb_config_done_t done;
+    void *ctx;
+    const uint8_t *piece;
+    uint16_t piece_len;
+    /* The host's write, which outlasts the job of a piece. */
+    uint16_t raw_at;    /* bytes that are in */
+    uint16_t raw_total; /* 0: there is none */
+    bool raw_same;      /* all of them are the stored ones: none was written yet */
+    profile_tlv_t reader;
+} arb_config_t;
+
+/* Checks both areas and chooses the newest good one. Blocks for as long as the memory needs to be read
+ * (24LC256: 0.4 s when both areas are full). */
+void arb_config_init(arb_config_t *config, arb_nvm_t *nvm);
+
+/* Does what is due: at most one page written, or ARB_CONFIG_READ_MAX bytes read. */
+void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
+
+/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to do. */
+uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms);
+
+/* A job is under way. */
+bool arb_config_busy(const arb_config_t *config);
+
+/* Whether this configuration is stored. */
+static inline bool arb_config_has(const arb_config_t *config, uint8_t number)
+{
+    return profile_tlv_has(config->numbers, number);
+}
+
+/* Hands all stored configurations to sink, in the order in which they stand. After any end but ARB_CONFIG_OK
+ * (ERR_STORAGE: the memory has failed or the copy is damaged) what was handed over must not be used. sink,
+ * which gets ctx too, must last until done. */
+arb_config_status_t arb_config_read(arb_config_t *config, const profile_tlv_sink_t *sink,
+                                    arb_config_done_t done, void *ctx, uint32_t now_ms);
+
+/* Stores count links as configuration *number; 0 takes the lowest free number and puts it there. A
+ * configuration of that number is replaced where it stands, with all that is in it; all others stay entry by
+ * entry as they are. Abandons a host's write that is not complete. */
+arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count,
+                                    arb_config_link_t link, arb_config_done_t done, void *ctx,
+                                    uint32_t now_ms);
+
+/* Removes a configuration. Abandons a host's write that is not complete. */
+arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number, arb_config_done_t done, void *ctx,
+                                     uint32_t now_ms);
+
+/* Length of the stored string. */
+static inline uint16_t arb_config_length(const arb_config_t *config)
+{
+    return config->length;
+}
+
+/* Reads up to *len bytes, at most ARB_CONFIG_READ_MAX, of the stored string at offset, at once; *len becomes
+ * how many there are. ERR_BUSY while a job is under way or the memory is another one's; ERR_VALUE: offset is
+ * beyond the length. */
+arb_config_status_t arb_config_read_raw(const arb_config_t *config, const arb_nvm_t *nvm, uint16_t offset,
+                                        uint8_t *bytes, uint8_t *len);
+
+/* Takes the next piece of a string of total bytes that replaces the stored one. Offset 0 begins, anew if need
+ * be; any other must follow the piece before, with the same total: else ERR_VALUE, and what is in stays in.
+ * The last piece stores the whole string, if profile_tlv.h accepts it; else nothing has changed. Each piece
+ * is a job; bytes must last until done. Pieces that end at a multiple of ARB_PORT_NVM_PAGE wear the memory
+ * least. */
+arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, uint16_t total,
+                                         const uint8_t *bytes, uint16_t len, arb_config_done_t done,
+                                         void *ctx, uint32_t now_ms);
+
+#endif

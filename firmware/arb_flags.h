@@ -1,0 +1,69 @@
+/* Keeps the flags of 2404h (host-api.md 3, D-API-5) over a power cycle.
+ *
+ * The record stands in two pages of the memory that are written in turn: power may fail at any byte of a
+ * write. One page:
+ *
+ *   byte   0   1   2        3       4    5    6 .. 5 + length   then
+ *          'P' 'F' version  length  seq  seq  settings          CRC-32 over everything before
+ *
+ * seq counts writes; both are LSB first. Settings: the flags byte. A longer record is read too: settings may
+ * be added behind. */
+#ifndef ARB_FLAGS_H
+#define ARB_FLAGS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "arb_nvm.h"
+
+enum {
+    ARB_FLAGS_VERSION = 1,
+    ARB_FLAGS_PAGES = 2,
+    ARB_FLAGS_HEADER = 6,
+    ARB_FLAGS_LENGTH = 1, /* bytes of settings that are written */
+    ARB_FLAGS_CRC = 4,
+    ARB_FLAGS_RETRY_MS = 500
+};
+
+/* The flags [host-api.md 2404]. The two highest are not stored: the event stream belongs to a session. */
+enum {
+    ARB_FLAG_AUTOCONFIGURE = 0x01,
+    ARB_FLAG_HOT_SWAP = 0x02,
+    ARB_FLAG_AUTO_SAVE = 0x04,
+    ARB_FLAG_STRICT_CRC = 0x08,
+    ARB_FLAG_EVENTS = 0x10,
+    ARB_FLAGS_STORED = 0x0F, /* those that are stored */
+    ARB_FLAGS_FACTORY = 0x03
+};
+
+typedef struct {
+    uint32_t due_ms;
+    uint16_t sequence; /* of the newest good copy */
+    uint8_t page;      /* where it stands; ARB_FLAGS_PAGES: nowhere */
+    uint8_t flags;     /* as they are to be */
+    uint8_t stored;    /* as they stand in the memory; those of the factory when nothing does */
+    uint8_t writing;   /* flags of the page under way; FFh: none is */
+    uint8_t failures;  /* writes that failed, since the start, FFh at most */
+    uint8_t damaged;   /* pages that were neither empty nor good at the start */
+} arb_flags_t;
+
+/* Reads the newest good copy. Blocks for as long as the memory needs to be read. */
+void arb_flags_load(arb_flags_t *flags, arb_nvm_t *nvm);
+
+/* Sets the flags, and stores them when they are not what is stored. Others than ARB_FLAGS_STORED are left
+ * out. */
+void arb_flags_set(arb_flags_t *flags, uint8_t value, uint32_t now_ms);
+
+/* The flags as they were set or stored last. */
+static inline uint8_t arb_flags_get(const arb_flags_t *flags)
+{
+    return flags->flags;
+}
+
+/* Writes when it is due; at most one page a call. */
+void arb_flags_step(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms);
+
+/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to write. */
+uint32_t arb_flags_next_ms(const arb_flags_t *flags, uint32_t now_ms);
+
+#endif

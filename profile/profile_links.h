@@ -1,0 +1,83 @@
+/* The active configuration: the links as they should be, whether their ends are there or not.
+ *
+ * It is what a save stores. An input has one entry at most. Entries are in the order of their inputs: lower
+ * profile, then lower VID, PID, SN, index, so that it does not matter in which order they came. Devices that
+ * several entries name are kept once (parts). Plain data: no frames, no time passes here. */
+#ifndef PROFILE_LINKS_H
+#define PROFILE_LINKS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_nodes.h"
+#include "profile_config.h"
+
+#ifndef PROFILE_LINKS_MAX
+#define PROFILE_LINKS_MAX 48 /* links of the active configuration, 1 to 254; 2401h tells it */
+#endif
+
+#ifndef PROFILE_PARTS_MAX
+#define PROFILE_PARTS_MAX 40 /* devices that these links name, 2 to 254 */
+#endif
+
+typedef struct {
+    pdcp_identity_t identity;
+    uint16_t type;
+    uint16_t profile;
+} profile_part_t;
+
+typedef struct {
+    uint16_t type;
+    uint16_t profile;
+    uint8_t part;
+    uint8_t index; /* channel index */
+} profile_ref_t;
+
+typedef struct {
+    profile_ref_t output;
+    profile_ref_t input;
+    uint8_t stand_in; /* channel number of the input that stands in for a missing one; PDCP_NONE: none.
+                         The planner's; an output that stands in is seen in the tables. */
+    bool by_host;     /* made by 2307h: left alone when an input that it requires is lost (D-PRO-9) */
+} profile_entry_t;
+
+typedef struct {
+    profile_part_t parts[PROFILE_PARTS_MAX]; /* in use: those that an entry names */
+    profile_entry_t entries[PROFILE_LINKS_MAX];
+    uint8_t count;
+} profile_links_t;
+
+void profile_links_init(profile_links_t *links);
+
+/* Adds a link, in place of the one that its input has. False: no room, nothing is changed. */
+bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool by_host);
+
+void profile_links_remove(profile_links_t *links, uint8_t entry);
+
+/* Would a link break sole access: has its output an entry with another sole-access input already? */
+bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t *link);
+
+/* Entry of the input with this owner and index; PDCP_NONE: it has none. */
+uint8_t profile_links_find(const profile_links_t *links, const pdcp_identity_t *owner, uint8_t index);
+
+/* The same for a channel of the tables. */
+uint8_t profile_links_of(const profile_links_t *links, const pdcp_nodes_t *nodes, uint8_t channel);
+
+/* Takes an entry out in full. */
+void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link_t *link);
+
+/* Place of the device that an end names; PDCP_NONE: it is not bound. */
+uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *nodes,
+                            const profile_ref_t *end);
+
+/* Channel number of an end that is there and set up, with this direction; PDCP_NONE: it is missing. */
+uint8_t profile_links_channel(const profile_links_t *links, const pdcp_nodes_t *nodes,
+                              const profile_ref_t *end, uint8_t transfer);
+
+/* A channel of the tables as the end of a link. */
+void profile_end_of(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end);
+
+/* The source that an input of the tables names, which need not be there. False: it names none. */
+bool profile_source_of(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end);
+
+#endif

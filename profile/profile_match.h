@@ -1,0 +1,35 @@
+/* How alike two channels are, and which of several comes first (profile-layer.md 3) [PROFILE listing 4.9]. */
+#ifndef PROFILE_MATCH_H
+#define PROFILE_MATCH_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_nodes.h"
+
+/* Candidates have at least the root component of their profiles in common (D-PRO-3). */
+#define PROFILE_CANDIDATE_MIN 8u
+
+/* 8 for each equal component of the profiles from the root on, then 4 for equal control mode, 2 for equal
+ * data type, 1 for equal byte size: 0 to 39. Less than PROFILE_CANDIDATE_MIN: no candidates. */
+uint8_t profile_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b);
+
+/* Flags of a channel's type. */
+bool profile_is_sole(const pdcp_channel_t *channel);
+bool profile_is_terminal(const pdcp_channel_t *channel);
+
+/* The profile that a terminal channel is served by, lowest first: its terminal profile, its own if that is 0
+ * (D-PRO-3). */
+uint16_t profile_priority(const pdcp_channel_t *channel);
+
+/* Is channel a before channel b: lower profile, then lower VID, PID, SN, index? The order of channels that
+ * are equally alike; it does not depend on where they stand in the tables (D-PRO-3). */
+bool profile_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b);
+
+/* Order of two identities by VID, PID, SN: below 0, 0, above 0. */
+int8_t profile_order(const pdcp_identity_t *a, const pdcp_identity_t *b);
+
+/* Is this channel on a device that is set up, and has it this direction (PDCP_INPUT, PDCP_OUTPUT)? */
+bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
+
+#endif

@@ -1,0 +1,113 @@
+/* The profile layer at work (profile-layer.md 4): when to plan, and how a plan becomes bus traffic.
+ *
+ * It waits for the start-up, then plans whenever a device is lost or has been set up. Of a plan it carries
+ * out one link after the other. A link that cannot be made is banned and the plan is made anew, without what
+ * the failed one has made (D-PRO-5). What it knows of stored configurations its owner tells it (arb_limb.h).
+ */
+#ifndef PROFILE_RUN_H
+#define PROFILE_RUN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_arb.h"
+#include "profile_links.h"
+#include "profile_plan.h"
+
+enum {
+    PROFILE_QUIET_MS = 500,   /* start-up waits until nothing has been bound or set up for so long */
+    PROFILE_ARRIVAL_MS = 500, /* the plan for a new device waits so long for others that are being set up */
+    PROFILE_RESET_MS = 3000,  /* a device that the host has reset is not lost so soon (profile-layer.md 4) */
+    PROFILE_RETRY_MS = 5000   /* links that could not be made are tried again */
+};
+
+typedef enum {
+    PROFILE_WAITING = 0,     /* for the start-up */
+    PROFILE_CONFIGURING = 1, /* a plan is being carried out */
+    PROFILE_RUNNING = 2
+} profile_state_t;
+
+/* What a plan is made for. */
+typedef enum {
+    PROFILE_FOR_EVENT,   /* from the links that work */
+    PROFILE_FOR_LOAD,    /* from nothing but what the host has made: other links that are not in the
+                            configuration go */
+    PROFILE_FOR_START,   /* the same, with what was read back from the devices as the configuration */
+    PROFILE_FOR_ENFORCE, /* sole access */
+    PROFILE_FOR_CLEAR    /* no links at all */
+} profile_purpose_t;
+
+typedef struct {
+    profile_links_t links; /* the active configuration */
+    profile_plan_t plan;
+    profile_pair_t banned[PROFILE_BANNED_MAX];
+    uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
+    uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
+    uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
+    uint8_t banned_count;
+    uint8_t state;      /* profile_state_t */
+    uint8_t purpose;    /* profile_purpose_t of the plan under way */
+    uint8_t what;       /* profile_plan_what_t of the plan under way */
+    uint8_t due;        /* of the plan to be made next, 0: none is */
+    bool planning;      /* a plan is being carried out */
+    bool wishing;       /* the link of wish_output to wish_input has been asked for */
+    bool urgent;        /* the plan that is due does not wait for devices being set up */
+    bool stored;        /* the configuration is a stored one (D-PRO-6) */
+    bool autoconfigure; /* flags of 2404h */
+    bool hot_swap;
+    bool frozen;  /* the configuration must not change (profile_run_freeze) */
+    bool changed; /* the configuration has changed since profile_run_take_change */
+    uint8_t wish_output;
+    uint8_t wish_input;
+    uint16_t moves;      /* links made or taken away by this plan */
+    uint32_t stirred_ms; /* when a setup ended last */
+    uint32_t arrived_ms; /* when the first device came for which a plan is due */
+    uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
+    uint32_t retry_ms;   /* means something while links are banned */
+} profile_run_t;
+
+void profile_run_init(profile_run_t *run, uint32_t now_ms);
+
+/* An event of the arbitrator; hand all of them in. */
+void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
+                          const pdcp_event_t *event);
+
+/* May the start-up begin: is a device set up, and has there been quiet for PROFILE_QUIET_MS? */
+bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms);
+
+/* Empties the active configuration for one that is to be loaded; keep_host leaves links that the host has
+ * made. Then profile_run_load_link for each of its links: one whose input has a link already is left out, and
+ * false means that there was no room. */
+void profile_run_load_begin(profile_run_t *run, bool keep_host);
+bool profile_run_load_link(profile_run_t *run, const profile_link_t *link);
+
+/* Begins the start-up. stored: a stored configuration has been loaded. Otherwise the configuration is read
+ * back from the sources that the devices name. */
+void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored);
+
+/* Begins a plan for the host. stored is as it was, but after PROFILE_FOR_LOAD. */
+void profile_run_begin(profile_run_t *run, pdcp_arb_t *arb, profile_purpose_t purpose, uint8_t what);
+
+/* Makes what stands in for missing ends the configuration. Returns how many links have changed. */
+uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb);
+
+/* While frozen, the active configuration stays as it is; what has happened meanwhile is taken up afterwards.
+ */
+void profile_run_freeze(profile_run_t *run, const pdcp_arb_t *arb, bool frozen);
+
+/* Are all links that work in the active configuration, and none for want of room is not? */
+bool profile_run_is_complete(const profile_run_t *run, const pdcp_arb_t *arb);
+
+/* Does what is due. True: the arbitrator was given something to do. */
+bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms);
+
+/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when nothing depends on time. */
+uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms);
+
+/* Is a plan due or being carried out? */
+bool profile_run_is_busy(const profile_run_t *run);
+
+/* Has the active configuration changed since the last call? */
+bool profile_run_take_change(profile_run_t *run);
+
+#endif

@@ -7,13 +7,17 @@
 #define ARB_APP_H
 
 #include "arb_hostapi.h"
+#include "arb_limb.h"
+#include "arb_nvm.h"
 #include "arb_port.h"
 #include "arb_store.h"
 #include "pdcp_arb.h"
 
 typedef struct {
     uint32_t serial; /* of this arbitrator: tells two on one bus apart (D-BUS-12) */
-    bool strict_crc; /* refuse host messages with wrong checksums (D-API-1) */
+    /* The command line's word, which overrides the stored flags of 2404h without being stored. */
+    bool strict_crc;    /* refuse host messages with wrong checksums (D-API-1) */
+    bool no_autoconfig; /* terminal channels are not linked by themselves */
 } arb_settings_t;
 
 /* Told of everything that happens on the bus, for a log or a display. Must not call back into the application
@@ -24,6 +28,8 @@ typedef struct {
     pdcp_arb_t arb;
     arb_hostapi_t api;
     arb_store_t store;
+    arb_nvm_t nvm;
+    arb_limb_t limb;
     const arb_port_t *port;
     bool work;               /* something was handed in, or frames or bytes wait for room */
     uint32_t next_ms;        /* what arb_app_step returned last */
@@ -43,6 +49,13 @@ void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
 
 /* The controller's state, whenever it may have changed; telling the same state again is harmless. */
 void arb_app_on_state(arb_app_t *app, uint32_t now_ms, pdcp_bus_state_t state);
+
+/* The controller's error counters, for the host; to be told before the state. */
+void arb_app_on_errors(arb_app_t *app, uint8_t transmit, uint8_t receive);
+
+/* The host has closed its end, where that can be seen: the next one gets no events unless it asks for them.
+ */
+void arb_app_on_host_gone(arb_app_t *app);
 
 /* Bytes from the host. Returns how many were taken; the rest is offered again after the next step. */
 uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes, uint16_t len);

@@ -3,7 +3,10 @@
  *
  * A fifth request is answered with error 07h at once, the only answer out of order (D-API-3). What is
  * answered from the tables is answered in the same call; what needs the bus stays at the front until the bus
- * has spoken. */
+ * has spoken. Events (arb_hostevents.h) are sent when no answer waits.
+ *
+ * How long an answer waits behind events that were handed over already is up to the port: host_write should
+ * take no more than the line carries within some 20 ms. */
 #ifndef ARB_HOSTAPI_H
 #define ARB_HOSTAPI_H
 
@@ -11,21 +14,35 @@
 #include <stdint.h>
 
 #include "arb_hostcodec.h"
+#include "arb_hostevents.h"
 #include "arb_hostrx.h"
+#include "arb_limb.h"
+#include "arb_nvm.h"
 #include "arb_port.h"
+#include "arb_store.h"
 #include "pdcp_arb.h"
 
 enum {
-    ARB_HELD_MAX = 4,            /* D-API-3 */
-    ARB_HOST_NOT_READY_MS = 2000 /* 2307h waits so long for a running setup (D-API-6) */
+    ARB_HELD_MAX = 4,             /* D-API-3 */
+    ARB_HOST_NOT_READY_MS = 2000, /* a running setup is waited for so long (D-API-6) */
+    ARB_HOST_ANSWER_MS = 3000     /* every request has its answer within this time (D-API-3) */
 };
 
 /* Payloads of the held requests together: the longest one and three short ones. A request that does not fit
  * is answered like a fifth one (D-API-9). */
 #define ARB_HELD_BYTES (ARB_HOST_REQUEST_MAX + 3 * 24)
 
-/* Answers out of order that wait behind the one being sent: four of the longest kind, 8 + 1 + 2 bytes. */
-#define ARB_URGENT_BYTES 44
+/* Answers out of order that wait behind the one being sent: three of the longest kind, 8 + 8 + 2 bytes. */
+#define ARB_URGENT_BYTES 54
+
+/* What the API speaks to. */
+typedef struct {
+    pdcp_arb_t *arb;
+    arb_limb_t *limb;
+    arb_nvm_t *nvm;
+    const arb_store_t *store;
+    const arb_port_t *port;
+} arb_hostenv_t;
 
 typedef struct {
     uint16_t id;
@@ -34,6 +51,20 @@ typedef struct {
     uint8_t reference;
     uint8_t error; /* found on reception: ARB_OK, ARB_ERR_CRC (strict), ARB_ERR_SIZE (too long) */
 } arb_held_t;
+
+/* How far the request at the front has come, when it cannot be answered at once. */
+typedef struct {
+    bool waiting;    /* the handler is to be called at until_ms at the latest */
+    bool started;    /* the bus works on it */
+    bool ended;      /* the bus has spoken: status, value_len */
+    int8_t status;   /* pdcp_status_t */
+    uint8_t channel; /* 2410h: number of the input */
+    uint8_t open;    /* 230Dh: devices whose reset has not ended */
+    uint16_t value_len;
+    uint32_t until_ms;
+    uint8_t asked[(PDCP_DEVICES_MAX + 7) / 8]; /* 230Dh: places of the devices that are to be reset */
+    uint8_t reset[(PDCP_DEVICES_MAX + 7) / 8]; /* and that were */
+} arb_turn_t;
 
 typedef struct {
     arb_hostrx_t rx;
@@ -47,16 +78,18 @@ typedef struct {
     uint16_t answer_sent;
     uint8_t urgent[ARB_URGENT_BYTES];
     uint8_t urgent_len;
+    arb_hostevents_t events;
 
-    bool strict; /* checksums are enforced (D-API-1) */
-    /* The request at the front, when it needs the bus. */
-    bool waiting;  /* until it can be started, at the latest until_ms */
-    bool started;  /* the bus works on it */
-    bool handed;   /* in this step the arbitrator was given something to do */
-    bool ended;    /* the bus has spoken: status, value_len */
-    int8_t status; /* pdcp_status_t */
-    uint16_t value_len;
-    uint32_t until_ms;
+    bool strict;  /* checksums are enforced (D-API-1) */
+    bool handed;  /* in this step the arbitrator was given something to do */
+    bool blocked; /* the host had no room for all when it was offered something last */
+    arb_turn_t turn;
+
+    uint32_t received; /* bytes */
+    uint32_t sent;     /* bytes */
+    uint32_t requests; /* messages received, those below included */
+    uint32_t busy;     /* answered with 07h because four were held */
+    uint32_t unknown;  /* answered with 2200h */
 } arb_hostapi_t;
 
 void arb_hostapi_init(arb_hostapi_t *api);
@@ -66,16 +99,31 @@ void arb_hostapi_init(arb_hostapi_t *api);
 uint16_t arb_hostapi_on_bytes(arb_hostapi_t *api, uint32_t now_ms, const uint8_t *bytes, uint16_t len);
 
 /* An event of the arbitrator. */
-void arb_hostapi_on_event(arb_hostapi_t *api, const pdcp_event_t *event);
+void arb_hostapi_on_event(arb_hostapi_t *api, const pdcp_arb_t *arb, uint32_t now_ms,
+                          const pdcp_event_t *event);
+
+/* Does the host want CAN frames? Asked for every frame. */
+static inline bool arb_hostapi_wants_frames(const arb_hostapi_t *api)
+{
+    return arb_hostevents_wants(&api->events, ARB_EVENT_FRAME);
+}
+
+/* A frame on the bus, received or sent, for a host that wants them: handed over at once if the host has room.
+ */
+void arb_hostapi_on_frame(arb_hostapi_t *api, const arb_port_t *port, uint32_t now_ms,
+                          const can_frame_t *frame);
+
+/* The host has closed its end: the event stream ends. Requests that it has sent are served to their end. */
+void arb_hostapi_on_host_gone(arb_hostapi_t *api);
 
 /* Serves what can be served and sends what can be sent. Returns true when the arbitrator was given something
  * to do. */
-bool arb_hostapi_step(arb_hostapi_t *api, pdcp_arb_t *arb, const arb_port_t *port, uint32_t now_ms);
+bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms);
 
-/* Do answers wait for room at the host? */
+/* Do answers or events wait for room at the host? */
 static inline bool arb_hostapi_has_output(const arb_hostapi_t *api)
 {
-    return api->answer_len != 0 || api->urgent_len != 0;
+    return api->answer_len != 0 || api->urgent_len != 0 || arb_hostevents_wait(&api->events);
 }
 
 /* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when nothing depends on time. */

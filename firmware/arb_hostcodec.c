@@ -52,6 +52,12 @@ void arb_host_put_u16(uint8_t *bytes, uint16_t value)
     bytes[1] = (uint8_t)(value >> 8);
 }
 
+void arb_host_put_u32(uint8_t *bytes, uint32_t value)
+{
+    arb_host_put_u16(&bytes[0], (uint16_t)(value & 0xFFFFu));
+    arb_host_put_u16(&bytes[2], (uint16_t)(value >> 16));
+}
+
 void arb_host_decode_header(const uint8_t bytes[ARB_HOST_HEADER], arb_host_header_t *header)
 {
     header->id = arb_host_get_u16(&bytes[2]);

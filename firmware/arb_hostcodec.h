@@ -35,7 +35,19 @@ enum {
     ARB_MSG_LINK_INFO = 0x220D,
     ARB_MSG_GET_PARAMETER = 0x2301,
     ARB_MSG_SET_PARAMETER = 0x2304,
-    ARB_MSG_CONFIGURE_LINK = 0x2307
+    ARB_MSG_CONFIGURE_LINK = 0x2307,
+    ARB_MSG_PASSTHROUGH = 0x230A,
+    ARB_MSG_RESET = 0x230D,
+    /* Extension group (D-API-5) */
+    ARB_MSG_ARBITRATOR_INFO = 0x2401,
+    ARB_MSG_SET_FLAGS = 0x2404,
+    ARB_MSG_ACTION = 0x2407,
+    ARB_MSG_READ_CONFIGS = 0x240A,
+    ARB_MSG_WRITE_CONFIGS = 0x240D,
+    ARB_MSG_REMOVE_LINK = 0x2410,
+    ARB_MSG_STATISTICS = 0x2413,
+    ARB_MSG_EVENT_STREAM = 0x2416,
+    ARB_MSG_EVENT = 0x2419 /* from the arbitrator, unasked */
 };
 
 /* Error codes of failure answers (D-API-4). */
@@ -48,9 +60,13 @@ enum {
     ARB_ERR_NO_ANSWER = 0x05,
     ARB_ERR_REFUSED = 0x06,
     ARB_ERR_BUSY = 0x07,
+    ARB_ERR_SOLE_ACCESS = 0x08,
+    ARB_ERR_NO_NODE_ID = 0x09,
     ARB_ERR_BULK = 0x0A,
     ARB_ERR_NOT_READY = 0x0B,
     ARB_ERR_CRC = 0x0C,
+    ARB_ERR_STORAGE = 0x0D,
+    ARB_ERR_NOT_SUPPORTED = 0x0E,
     ARB_ERR_VALUE = 0x0F
 };
 
@@ -77,6 +93,7 @@ uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_
 uint16_t arb_host_get_u16(const uint8_t *bytes);
 pdcp_identity_t arb_host_get_identity(const uint8_t bytes[6]); /* VID, PID, SN */
 void arb_host_put_u16(uint8_t *bytes, uint16_t value);
+void arb_host_put_u32(uint8_t *bytes, uint32_t value);
 void arb_host_put_identity(uint8_t bytes[6], const pdcp_identity_t *identity);
 void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
 

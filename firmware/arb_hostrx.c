@@ -50,15 +50,18 @@ void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte)
     }
 }
 
+static bool crc8_matches(const arb_hostrx_t *rx, const arb_host_header_t *header)
+{
+    return header->crc8 == arb_host_crc8(rx->bytes);
+}
+
 /* Are the checksums of the message at the front right? */
 static bool checksums_match(const arb_hostrx_t *rx, const arb_host_header_t *header)
 {
-    if (header->crc8 != arb_host_crc8(rx->bytes)) {
-        return false;
-    }
     const uint16_t payload = (uint16_t)(header->size - ARB_HOST_CRC);
-    return header->size == 0 || arb_host_get_u16(&rx->bytes[ARB_HOST_HEADER + payload]) ==
-                                    arb_host_crc16(&rx->bytes[ARB_HOST_HEADER], payload);
+    return crc8_matches(rx, header) &&
+           (header->size == 0 || arb_host_get_u16(&rx->bytes[ARB_HOST_HEADER + payload]) ==
+                                     arb_host_crc16(&rx->bytes[ARB_HOST_HEADER], payload));
 }
 
 typedef enum { INSIDE_NOTHING, INSIDE_HEADER, INSIDE_DOUBTFUL } inside_t;
@@ -149,7 +152,7 @@ bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
             if (inside == INSIDE_DOUBTFUL && !rx->overdue) {
                 return false;
             }
-            rx->bad_crcs++;
+            (*(crc8_matches(rx, &header) ? &rx->bad_crc16s : &rx->bad_crc8s))++;
             if (inside == INSIDE_HEADER) {
                 hunt(rx, 1);
                 continue;

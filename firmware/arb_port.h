@@ -1,6 +1,6 @@
 /* What the arbitrator needs from outside: a controller to send to, a host to write to, memory that keeps. The
  * program that owns an arb_app_t fills one of these; the functions are called from inside arb_app_* only and
- * never block. */
+ * never block, but for nvm_read. */
 #ifndef ARB_PORT_H
 #define ARB_PORT_H
 
@@ -24,8 +24,9 @@ typedef struct {
      * no room now: the program calls arb_app_step as soon as there is some. */
     size_t (*host_write)(void *ctx, const uint8_t *bytes, size_t size);
 
-    /* Reads size bytes of non-volatile memory; only from arb_app_init. False: failed, the memory counts as
-     * empty. */
+    /* Reads size bytes of non-volatile memory: any number from arb_app_init, later 128 at most, and never
+     * while a write is under way. Takes as long as the bus to the memory needs (24LC256: 25 us a byte).
+     * False: failed; at the start what could not be read counts as empty. */
     bool (*nvm_read)(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size);
 
     /* Starts to write size bytes, at most ARB_PORT_NVM_PAGE and inside one page. False: busy or failed. */

@@ -15,6 +15,7 @@ static void forget_bus(pdcp_arb_t *arb, uint32_t now_ms)
     pdcp_link_init(&arb->link);
     memset(arb->bind.reserved, 0, sizeof arb->bind.reserved);
     memset(arb->strangers, 0, sizeof arb->strangers);
+    arb->asked_ms = now_ms;
     arb->started_ms = now_ms;
     arb->young = true;
     pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms);
@@ -139,7 +140,9 @@ static void start_host_request(pdcp_arb_t *arb, uint32_t now_ms)
     }
     host->waiting = false;
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
-    if (host->code == PDCP_SET_PARAMETER) {
+    if (host->raw) {
+        pdcp_request_raw(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->bytes, (uint8_t)host->size);
+    } else if (host->code == PDCP_SET_PARAMETER) {
         pdcp_request_set(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
                          host->bytes, host->size);
     } else if (host->code == PDCP_GET_PARAMETER) {
@@ -199,6 +202,7 @@ static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *f
     }
     uint8_t node;
     count(arb, PDCP_STAT_TAKEN);
+    arb->asked_ms = now_ms;
     const pdcp_bind_result_t result =
         pdcp_bind_on_request(&arb->bind, &arb->bus, now_ms, &msg.identity, pdcp_id_node(frame->id), &node);
     after_bind(arb, now_ms, node, result);
@@ -329,17 +333,55 @@ static bool on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
     return true;
 }
 
+/* The host has written a parameter that stands in the tables (D-BUS-25). */
+static void host_has_set(pdcp_arb_t *arb, uint32_t now_ms, const uint8_t *value, uint16_t len)
+{
+    const pdcp_host_request_t *host = &arb->host;
+    if (host->channel == 0) {
+        pdcp_setup_take_time(node_of(arb, host->node), host->param, value,
+                             (uint8_t)(len < PDCP_VALUE_MAX ? len : PDCP_VALUE_MAX));
+        expect_life(arb, now_ms, host->node);
+        return;
+    }
+    const uint8_t channel = pdcp_nodes_channel(&arb->bus.nodes, host->node, host->channel);
+    if (host->param == PDCP_CH_ENABLED && channel != PDCP_NONE && len != 0) {
+        arb->bus.nodes.channels[channel].enabled = value[0] != 0;
+    }
+}
+
+/* The answer to a frame that the host has passed through: the whole of it goes back. */
+static void host_on_raw(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
+{
+    pdcp_host_request_t *host = &arb->host;
+    const uint8_t node = host->node;
+    const bool success = reply->status == PDCP_OK && (reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
+    if (success && host->code == PDCP_SET_PARAMETER && host->size >= 3) {
+        host_has_set(arb, now_ms, &host->bytes[3], (uint16_t)(host->size - 3));
+    }
+    if (reply->status == PDCP_OK) {
+        memcpy(host->bytes, reply->bytes, reply->len);
+        host->len = reply->len;
+    }
+    host_ends(arb, now_ms, (pdcp_status_t)reply->status);
+    if (success && host->code == PDCP_RESET) {
+        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_RESET, node, PDCP_NONE, PDCP_OK);
+        lose(arb, now_ms, node);
+    }
+}
+
 static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
 {
     pdcp_host_request_t *host = &arb->host;
+    if (host->raw) {
+        host_on_raw(arb, now_ms, reply);
+        return;
+    }
     if (host->code == PDCP_GET_PARAMETER && reply->len != 0 && reply->offset + reply->len <= host->size) {
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
         host->len = (uint16_t)(reply->offset + reply->len);
     }
-    if (host->code == PDCP_SET_PARAMETER && reply->status == PDCP_OK && host->channel == 0) {
-        pdcp_setup_take_time(node_of(arb, host->node), host->param, host->bytes,
-                             (uint8_t)(host->size < PDCP_VALUE_MAX ? host->size : PDCP_VALUE_MAX));
-        expect_life(arb, now_ms, host->node);
+    if (host->code == PDCP_SET_PARAMETER && reply->status == PDCP_OK) {
+        host_has_set(arb, now_ms, host->bytes, host->size);
     }
     if (reply->done && reply->offset == 0 && reply->len == 0) {
         host->len = 0; /* a transfer that began anew may have ended empty */
@@ -429,6 +471,12 @@ static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
+    if (pdcp_request_on_frame(&arb->bus, node, frame, &reply)) {
+        count(arb, PDCP_STAT_TAKEN);
+        on_reply(arb, now_ms, node, &reply);
+        serve(arb, now_ms, node);
+        return;
+    }
     const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
     if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
         count(arb, PDCP_STAT_DROP_BAD_CODE);
@@ -653,6 +701,18 @@ pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint
     return host_request(arb, &request);
 }
 
+pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data, uint8_t dlc)
+{
+    const pdcp_host_request_t request = {.raw = true,
+                                         .code = data[0],
+                                         .node = node,
+                                         .param = data[1],
+                                         .channel = data[2],
+                                         .bytes = data,
+                                         .size = dlc};
+    return host_request(arb, &request);
+}
+
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 {
     const pdcp_msg_t msg = {.code = code, .word = time_ms};
@@ -667,6 +727,16 @@ bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
     node_of(arb, node)->reset_asked = true;
     serve(arb, now_ms, node);
     return true;
+}
+
+void pdcp_arb_withdraw_resets(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        const pdcp_request_t *request = &node_of(arb, i)->request;
+        if (request->state == PDCP_REQUEST_IDLE || request->client != PDCP_CLIENT_RESET) {
+            reset_ends(arb, now_ms, i, PDCP_ERR_BUSY);
+        }
+    }
 }
 
 void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state)
@@ -716,6 +786,39 @@ bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
     }
     pdcp_link_remove(&arb->link, &arb->bus, input);
     return true;
+}
+
+void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored)
+{
+    arb->link.planned = true;
+    arb->link.stored = stored;
+}
+
+void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+{
+    if (input < PDCP_CHANNELS_MAX && arb->bus.nodes.channels[input].node != PDCP_NONE &&
+        arb->bus.nodes.channels[input].link == PDCP_LINK_ACTIVE) {
+        pdcp_link_rest(&arb->link, &arb->bus, now_ms, input);
+    }
+}
+
+void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source)
+{
+    pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
+    if (channel->link != PDCP_LINK_NONE) {
+        return;
+    }
+    channel->source = source->identity;
+    channel->source_index = source->index;
+    channel->source_type = source->type;
+    channel->source_profile = source->profile;
+    channel->link = PDCP_LINK_INACTIVE;
+    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_LINK, channel->node, input, PDCP_OK);
+}
+
+bool pdcp_arb_links_settled(const pdcp_arb_t *arb)
+{
+    return pdcp_link_is_settled(&arb->link);
 }
 
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)

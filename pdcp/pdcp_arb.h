@@ -22,7 +22,8 @@
 typedef struct {
     bool active;
     bool waiting; /* for the device's place */
-    uint8_t code; /* PDCP_GET_PARAMETER, PDCP_SET_PARAMETER, PDCP_SUSPEND, PDCP_RELEASE */
+    bool raw;     /* a frame as the host made it: bytes holds its data, 8 bytes of room, size is its DLC */
+    uint8_t code; /* PDCP_GET_PARAMETER, PDCP_SET_PARAMETER, PDCP_SUSPEND, PDCP_RELEASE; raw: any request's */
     uint8_t node;
     uint8_t channel;
     uint8_t param;
@@ -39,12 +40,21 @@ typedef struct {
 
 #define PDCP_STRANGERS_MAX 8
 
+/* What names an output: an input's parameters 5, 6 and 8. */
+typedef struct {
+    pdcp_identity_t identity;
+    uint16_t type;
+    uint16_t profile;
+    uint8_t index;
+} pdcp_link_source_t;
+
 typedef struct {
     pdcp_bus_t bus;
     pdcp_bind_t bind;
     pdcp_link_t link;
     pdcp_host_request_t host;
     pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
+    uint32_t asked_ms;   /* when a device asked to bind last, or the start */
     uint32_t started_ms; /* means something while young */
     bool young;          /* in its first PDCP_YOUNG_MS */
     uint32_t foreign_ms; /* when another arbitrator was heard last */
@@ -93,6 +103,12 @@ bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input);
  * outcome as with pdcp_arb_get. */
 pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint16_t time_ms);
 
+/* Passes a frame through: data[] holds dlc bytes, 1 to 8, beginning with a function code below PDCP_ANSWER,
+ * and has room for 8. At PDCP_EVENT_REQUEST with PDCP_OK it holds the device's answer, len bytes, whatever
+ * the answer says. The tables follow a Reset Device and a Set Device Parameter; otherwise as with
+ * pdcp_arb_set. */
+pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data, uint8_t dlc);
+
 /* Suspend or Release for all, sent to N=0; devices do not answer. False: no room in the transmit queue. */
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms);
 
@@ -100,11 +116,32 @@ bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms);
  * until it binds again. False: no such device. */
 bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node);
 
+/* Resets that could not be sent yet, because their devices have other requests under way, end with
+ * PDCP_ERR_BUSY. */
+void pdcp_arb_withdraw_resets(pdcp_arb_t *arb, uint32_t now_ms);
+
 /* The controller's state, whenever it has changed (pdcp_recovery.h). */
 void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state);
 
 /* True, once: the controller is to be restarted now. */
 bool pdcp_arb_take_restart(pdcp_arb_t *arb);
+
+/* The profile layer takes over: no link is made but by pdcp_arb_connect and Update Data Channel, and by the
+ * latter neither while stored is true, a stored configuration is loaded (pdcp-bus.md 7). stored is forgotten
+ * when the bus is. */
+void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored);
+
+/* Lets the active link of an input rest: both ends are disabled, its source stays written (D-PRO-9);
+ * PDCP_EVENT_LINK comes at once. Of others, and of PDCP_NONE, nothing happens. */
+void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
+
+/* Lists the link of an input that has none as inactive, with a source that need not be there; nothing is
+ * sent.
+ */
+void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source);
+
+/* Have all links been made or taken away that were to be? */
+bool pdcp_arb_links_settled(const pdcp_arb_t *arb);
 
 /* Is a device being set up? */
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb);

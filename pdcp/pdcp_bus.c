@@ -1,14 +1,19 @@
 #include "pdcp_bus.h"
 
-bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg)
+bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame)
 {
-    can_frame_t frame;
-    pdcp_encode(pdcp_can_id(priority, true, node_id), msg, &frame);
-    const pdcp_txq_put_t put = pdcp_txq_put(&bus->txq, &frame);
+    const pdcp_txq_put_t put = pdcp_txq_put(&bus->txq, frame);
     if (put != PDCP_TXQ_TAKEN) {
         pdcp_bus_count(bus, PDCP_STAT_TX_FULL);
     }
     return put != PDCP_TXQ_FULL;
+}
+
+bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg)
+{
+    can_frame_t frame;
+    pdcp_encode(pdcp_can_id(priority, true, node_id), msg, &frame);
+    return pdcp_bus_send_frame(bus, &frame);
 }
 
 void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,

@@ -51,7 +51,9 @@ typedef struct pdcp_bus {
 
 void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 
-/* Puts a message from the arbitrator into the transmit queue. False: the queue is full, which is counted. */
+/* Puts a frame, or a message from the arbitrator, into the transmit queue. False: the queue is full, which is
+ * counted. */
+bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
 
 void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,

@@ -19,7 +19,9 @@ typedef enum {
 
 void pdcp_link_init(pdcp_link_t *link)
 {
+    const bool planned = link->planned;
     memset(link, 0, sizeof *link);
+    link->planned = planned;
     link->wish_input = PDCP_NONE;
     link->at = PDCP_NONE;
 }
@@ -40,9 +42,12 @@ static bool is_unconnected(const pdcp_channel_t *input)
     return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
 }
 
+/* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing to be made. */
 static void put_todo(pdcp_link_t *link, pdcp_channel_t *channel, pdcp_todo_t todo)
 {
-    channel->todo = (uint8_t)todo;
+    if (channel->todo != PDCP_TODO_REMOVE) {
+        channel->todo = (uint8_t)todo;
+    }
     link->due = true;
 }
 
@@ -122,7 +127,7 @@ void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8
 
 void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
 {
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && !link->planned; i++) {
         pdcp_channel_t *input = &bus->nodes.channels[i];
         if (input->node == PDCP_NONE || input->link != PDCP_LINK_INACTIVE) {
             continue;
@@ -148,6 +153,17 @@ static void deactivate(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint
         put_todo(link, input, PDCP_TODO_SILENCE);
     }
     pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
+}
+
+bool pdcp_link_is_settled(const pdcp_link_t *link)
+{
+    return !link->active && !link->due && link->wish_input == PDCP_NONE;
+}
+
+void pdcp_link_rest(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t input)
+{
+    deactivate(link, bus, now_ms, input, false);
+    release_output(link, bus, bus->nodes.channels[input].feed);
 }
 
 static void give_back_old(const pdcp_link_t *link, pdcp_channel_t *input)
@@ -344,7 +360,7 @@ static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
     input->feed = input->link != PDCP_LINK_NONE ? find_source(bus, input) : PDCP_NONE;
     if (link->old_link == PDCP_LINK_ACTIVE) {
         put_todo(link, input, PDCP_TODO_CONNECT);
-    } else if (input->link == PDCP_LINK_INACTIVE && link->status == PDCP_ERR_NO_ANSWER) {
+    } else if (input->link == PDCP_LINK_INACTIVE && link->status == PDCP_ERR_NO_ANSWER && !link->planned) {
         pdcp_timers_set(&bus->timers, PDCP_TIMER_LINK, now_ms + PDCP_LINK_PAUSE_MS); /* D-BUS-26 */
     }
     silence_again(link, input);
@@ -636,8 +652,9 @@ static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
         }
         break;
     default: /* PDCP_TODO_UPDATE; its direction may not have been known when it came */
-        if (channel->transfer != PDCP_INPUT) {
-            answer_update(bus, channel->node, channel->index, PDCP_FAILURE);
+        if (channel->transfer != PDCP_INPUT || link->stored) {
+            const bool connected = channel->transfer == PDCP_INPUT && channel->link == PDCP_LINK_ACTIVE;
+            answer_update(bus, channel->node, channel->index, connected ? PDCP_SUCCESS : PDCP_FAILURE);
             break;
         }
         begin(link, todo, number, PDCP_NONE, STEP_READ_VID_PID);

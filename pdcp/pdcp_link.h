@@ -10,6 +10,8 @@
 #include "pdcp_bus.h"
 
 typedef struct {
+    bool planned;       /* the profile layer decides which links are made: none comes by itself */
+    bool stored;        /* and from a stored configuration: Update Data Channel changes nothing */
     bool due;           /* some channel has something to do */
     bool active;        /* a job is under way */
     bool waiting;       /* the job can go on, when the device it is about has no other request under way */
@@ -36,7 +38,14 @@ typedef struct {
     uint8_t wish_output;
 } pdcp_link_t;
 
+/* Nothing is under way; planned stays as it is. */
 void pdcp_link_init(pdcp_link_t *link);
+
+/* Is there neither a job nor anything to do? */
+bool pdcp_link_is_settled(const pdcp_link_t *link);
+
+/* Lets an active link rest: both ends disabled, source remembered (D-PRO-9). */
+void pdcp_link_rest(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t input);
 
 /* Asks for exactly this link. The outcome comes as PDCP_EVENT_WISH. False: another wish is under way. */
 bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input);

@@ -26,6 +26,15 @@ static void send_packet(pdcp_bus_t *bus, uint8_t node)
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, bus->nodes.nodes[node].node_id, &msg);
 }
 
+static void send_raw(pdcp_bus_t *bus, uint8_t node)
+{
+    const pdcp_request_t *request = request_of(bus, node);
+    can_frame_t frame = {.id = pdcp_can_id(PDCP_PRIORITY_NORMAL, true, bus->nodes.nodes[node].node_id),
+                         .dlc = (uint8_t)request->size};
+    memcpy(frame.data, request->bytes, frame.dlc);
+    (void)pdcp_bus_send_frame(bus, &frame);
+}
+
 /* Sends what the state asks for and waits for its answer. A frame that finds no room is repeated at the
  * deadline, like one that got lost on the way. */
 static void send(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
@@ -53,6 +62,9 @@ static void send(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
         break;
     case PDCP_REQUEST_SET_DATA:
         send_packet(bus, node);
+        break;
+    case PDCP_REQUEST_RAW:
+        send_raw(bus, node);
         break;
     default: /* GET_DATA: the device sends by itself */
         break;
@@ -113,6 +125,14 @@ void pdcp_request_command(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_c
 {
     const pdcp_request_t what = {
         .client = (uint8_t)client, .code = code, .size = time_ms, .state = PDCP_REQUEST_ANSWER};
+    start(bus, now_ms, node, &what);
+}
+
+void pdcp_request_raw(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
+                      const uint8_t *data, uint8_t dlc)
+{
+    const pdcp_request_t what = {
+        .client = (uint8_t)client, .code = data[0], .bytes = data, .size = dlc, .state = PDCP_REQUEST_RAW};
     start(bus, now_ms, node, &what);
 }
 
@@ -309,6 +329,27 @@ static bool on_packet_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, con
     }
     enter(bus, now_ms, node, PDCP_REQUEST_SET_DATA);
     return false;
+}
+
+/* Is the frame a well-formed answer about another parameter or channel than the raw request's? */
+static bool is_about_another(const pdcp_request_t *request, const can_frame_t *frame)
+{
+    const bool is_parameter = request->code == PDCP_GET_PARAMETER || request->code == PDCP_SET_PARAMETER;
+    return is_parameter && request->size >= 3 && frame->dlc >= 4 &&
+           (frame->data[2] != request->bytes[1] || frame->data[3] != request->bytes[2]);
+}
+
+bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t node, const can_frame_t *frame, pdcp_reply_t *reply)
+{
+    const pdcp_request_t *request = request_of(bus, node);
+    if (request->state != PDCP_REQUEST_RAW || frame->dlc == 0 ||
+        frame->data[0] != (request->code | PDCP_ANSWER) || is_about_another(request, frame)) {
+        return false;
+    }
+    reply_head(request, reply);
+    reply->bytes = frame->data;
+    reply->len = frame->dlc;
+    return finish(bus, node, PDCP_OK, reply);
 }
 
 bool pdcp_request_on_message(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,

@@ -2,8 +2,9 @@
  *
  * A request is sent, repeated after the device's acknowledgement time, PDCP_TRIES in all, and ends with
  * exactly one reply whose done is true, unless it is cancelled. Values of more than four bytes go by bulk
- * transfer, as does a value that the device itself wants so. Which part of the arbitrator asked (the client)
- * travels with the request and comes back in the reply: this file decides nothing about it. */
+ * transfer, as does a value that the device itself wants so. A raw request is a frame as the host made it,
+ * whose answer is handed on whole. Which part of the arbitrator asked (the client) travels with the request
+ * and comes back in the reply: this file decides nothing about it. */
 #ifndef PDCP_REQUEST_H
 #define PDCP_REQUEST_H
 
@@ -40,13 +41,14 @@ typedef enum {
     PDCP_REQUEST_GET_DATA, /* waiting for the device's next 0E */
     PDCP_REQUEST_SET_SIZE, /* 0D sent, waiting for 8D */
     PDCP_REQUEST_SET_DATA, /* 0E sent, waiting for 8E */
+    PDCP_REQUEST_RAW,      /* a frame of the host sent, waiting for its answer */
     PDCP_REQUEST_STATES
 } pdcp_request_state_t;
 
 /* Belongs to one device's place in the table. */
 typedef struct {
-    const uint8_t *bytes; /* value to be set by bulk; NULL: it is in value */
-    uint16_t size;        /* of the whole value: to be set, or as 8C says; 08: the time in ms */
+    const uint8_t *bytes; /* value to be set by bulk, or data of a raw request; NULL: it is in value */
+    uint16_t size;        /* of the whole value: to be set, or as 8C says; 08: the time in ms; raw: the DLC */
     uint16_t max_size;    /* longest value that may be got */
     uint16_t offset;      /* bytes transferred so far */
     uint8_t state;        /* pdcp_request_state_t */
@@ -70,7 +72,7 @@ typedef struct {
     uint8_t param;
     uint8_t channel;
     uint16_t offset;      /* of bytes in the value; values of up to 4 bytes come in one piece */
-    uint16_t len;         /* bytes that came now, 0 to 6 */
+    uint16_t len;         /* bytes that came now, 0 to 6; raw: the whole data of the answer, 1 to 8 */
     const uint8_t *bytes; /* valid during the call only */
 } pdcp_reply_t;
 
@@ -87,11 +89,20 @@ void pdcp_request_set(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_
 void pdcp_request_command(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
                           uint8_t code, uint16_t time_ms);
 
+/* Sends data[], 1 to 8 bytes beginning with a function code below PDCP_ANSWER, as it is. data[] must stay
+ * where it is until the reply. */
+void pdcp_request_raw(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
+                      const uint8_t *data, uint8_t dlc);
+
 /* Lets the request that is under way be sent no more than this once. */
 void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);
 
 /* Forgets a request without a reply. */
 void pdcp_request_cancel(struct pdcp_bus *bus, uint8_t node);
+
+/* A frame from a device. True: it answers the device's raw request, reply says how. An answer about another
+ * parameter or channel, to a request before, is not taken for it. */
+bool pdcp_request_on_frame(struct pdcp_bus *bus, uint8_t node, const can_frame_t *frame, pdcp_reply_t *reply);
 
 /* A decoded message from a device, or the deadline of its request. True: reply says what follows. An answer
  * that belongs to no request is counted and otherwise ignored. */

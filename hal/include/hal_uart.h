@@ -14,7 +14,9 @@ typedef struct hal_uart hal_uart_t;
 size_t hal_uart_read(hal_uart_t *uart, uint8_t *bytes, size_t size);
 
 /* Hands up to size bytes over; they are copied. Returns how many were taken, in order from the first;
- * less than size means that there is no more room now, and the caller offers the rest again. */
+ * less than size means that there is no more room now, and the caller offers the rest again. On a line with a
+ * baud rate no more than it carries within some 20 ms waits behind this, so that what comes next is never
+ * late. */
 size_t hal_uart_write(hal_uart_t *uart, const uint8_t *bytes, size_t size);
 
 #endif

@@ -1,14 +1,19 @@
 /* Opening the host's byte stream on Linux. What can be done with it then stands in hal_uart.h.
  *
- * PORT is pty or pty:LINKPATH, a new pseudo-terminal in raw mode; with LINKPATH a symbolic link to it is
- * made, replacing a stale one, and removed at the end. A path that is no symbolic link is never replaced.
+ * PORT is one of
  *
- * When the last host closes its end, what it has not read is thrown away and the end is put back into raw
- * mode. A host that reopens before the loop has come round may still find bytes that were meant for the one
- * before. */
+ *   pty, pty:LINKPATH       a new pseudo-terminal in raw mode; with LINKPATH a symbolic link to it is made,
+ * replacing a stale one (to a terminal that does not exist any more), and removed at the end. Nothing else is
+ * ever replaced. serial:DEVICE[@BAUD]    a serial line, raw, 8N1, for this program alone; any rate that the
+ * driver can make, 128000 when none is given. While its adapter is pulled out there is no host.
+ *
+ * When the last host of a pseudo-terminal closes its end, what it has not read is thrown away and the end is
+ * put back into raw mode. A host that reopens before the loop has come round may still find bytes that were
+ * meant for the one before. */
 #ifndef LINUX_UART_H
 #define LINUX_UART_H
 
+#include <stdbool.h>
 #include <stddef.h>
 
 #include "hal_uart.h"
@@ -24,7 +29,12 @@ hal_uart_t *linux_uart_open(loop_t *loop, const char *port, linux_uart_ready_t r
                             size_t error_size);
 void linux_uart_close(hal_uart_t *uart);
 
-/* Path that a host opens: the pseudo-terminal's own name, not the link. Valid until closed. */
+/* Path that a host opens: the pseudo-terminal's own name, not the link; of a serial line the device. Valid
+ * until closed. */
 const char *linux_uart_path(const hal_uart_t *uart);
+
+/* True, once: the host has closed its end since the last call, or the adapter was pulled out. Bytes that it
+ * has sent before were all taken. A host that closes and reopens a serial line is not seen. */
+bool linux_uart_host_left(hal_uart_t *uart);
 
 #endif

@@ -367,6 +367,44 @@ static void test_stale_link_is_replaced(void)
     expect_link_to_us();
 }
 
+/* A second program does not take a running one's host away. */
+static void test_link_of_a_running_program_is_left(void)
+{
+    char port[80];
+    char expected[200];
+    open_linked();
+    snprintf(port, sizeof port, "pty:%s", link_path);
+    TEST_ASSERT_NULL(linux_uart_open(loop, port, on_ready, NULL, error, sizeof error));
+    snprintf(expected, sizeof expected, "%s: is in use: it leads to a terminal that exists", port);
+    TEST_ASSERT_EQUAL_STRING(expected, error);
+    expect_link_to_us();
+}
+
+/* What a program that was killed leaves behind: its terminal's number may be the new one's. */
+static void test_link_to_the_number_of_the_new_terminal_is_stale(void)
+{
+    open_uart("pty");
+    TEST_ASSERT_EQUAL_INT(0, symlink(linux_uart_path(uart), link_path));
+    close_uart();
+    open_linked();
+    expect_link_to_us();
+}
+
+static void test_a_host_that_has_left_is_told_once(void)
+{
+    open_uart("pty");
+    settle(10000);
+    TEST_ASSERT_FALSE(linux_uart_host_left(uart));
+    int host = open_host();
+    host_sends(host, "x");
+    expect_from_host("x");
+    TEST_ASSERT_FALSE(linux_uart_host_left(uart));
+    close(host);
+    settle(10000);
+    TEST_ASSERT_TRUE(linux_uart_host_left(uart));
+    TEST_ASSERT_FALSE(linux_uart_host_left(uart));
+}
+
 static void test_link_that_now_belongs_to_another_is_left(void)
 {
     open_linked();
@@ -390,11 +428,12 @@ static void test_file_in_the_place_of_the_link_is_an_error_and_left(void)
 
 static void test_unknown_ports_are_refused_by_name(void)
 {
-    const char *const ports[] = {"", "pty:", "ptyx", "tcp:1"};
-    for (size_t i = 0; i < 4; i++) {
-        char expected[100];
+    const char *const ports[] = {"", "pty:", "ptyx", "tcp:1", "serial", "serial:"};
+    for (size_t i = 0; i < sizeof ports / sizeof ports[0]; i++) {
+        char expected[120];
         TEST_ASSERT_NULL(linux_uart_open(loop, ports[i], on_ready, NULL, error, sizeof error));
-        snprintf(expected, sizeof expected, "%s: not a host port; expected pty or pty:LINKPATH", ports[i]);
+        snprintf(expected, sizeof expected,
+                 "%s: not a host port; expected pty, pty:LINKPATH or serial:DEVICE[@BAUD]", ports[i]);
         TEST_ASSERT_EQUAL_STRING(expected, error);
     }
 }
@@ -415,6 +454,9 @@ int main(void)
     RUN_TEST(test_settings_of_a_host_do_not_stay_for_the_next);
     RUN_TEST(test_link_is_made_and_removed);
     RUN_TEST(test_stale_link_is_replaced);
+    RUN_TEST(test_link_of_a_running_program_is_left);
+    RUN_TEST(test_link_to_the_number_of_the_new_terminal_is_stale);
+    RUN_TEST(test_a_host_that_has_left_is_told_once);
     RUN_TEST(test_link_that_now_belongs_to_another_is_left);
     RUN_TEST(test_file_in_the_place_of_the_link_is_an_error_and_left);
     RUN_TEST(test_unknown_ports_are_refused_by_name);

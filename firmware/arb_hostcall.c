@@ -1,0 +1,88 @@
+#include "arb_hostcall.h"
+
+#include <stddef.h>
+
+#include "pdcp_time.h"
+
+const arb_message_t *arb_call_find(const arb_message_t *messages, uint8_t count, uint16_t id)
+{
+    for (uint8_t i = 0; i < count; i++) {
+        if (messages[i].id == id) {
+            return &messages[i];
+        }
+    }
+    return NULL;
+}
+
+uint8_t arb_call_started(arb_call_t *call)
+{
+    call->turn->started = true;
+    call->turn->waiting = false;
+    call->api->handed = true;
+    return ARB_PENDING;
+}
+
+bool arb_call_wait(arb_call_t *call, uint16_t limit_ms)
+{
+    arb_turn_t *turn = call->turn;
+    if (!turn->waiting) {
+        turn->waiting = true;
+        turn->until_ms = call->now_ms + limit_ms;
+    }
+    return !pdcp_time_reached(call->now_ms, turn->until_ms);
+}
+
+uint8_t arb_call_started_limited(arb_call_t *call)
+{
+    arb_turn_t *turn = call->turn;
+    const uint32_t first_ms = turn->waiting ? turn->until_ms - ARB_HOST_NOT_READY_MS : call->now_ms;
+    (void)arb_call_started(call);
+    turn->waiting = true;
+    turn->until_ms = first_ms + ARB_HOST_ANSWER_MS;
+    return ARB_PENDING;
+}
+
+bool arb_call_is_busy(const arb_call_t *call)
+{
+    return pdcp_arb_setup_running(call->arb) || arb_limb_is_busy(call->env->limb);
+}
+
+uint8_t arb_call_wait_ready(arb_call_t *call)
+{
+    return arb_call_wait(call, ARB_HOST_NOT_READY_MS) ? ARB_PENDING : ARB_ERR_NOT_READY;
+}
+
+uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
+{
+    const pdcp_identity_t identity = arb_host_get_identity(bytes);
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const uint8_t place = pdcp_nodes_find(nodes, &identity);
+    return place != PDCP_NONE && nodes->nodes[place].state != PDCP_NODE_LOST ? place : PDCP_NONE;
+}
+
+uint8_t arb_call_channel(const arb_call_t *call, const uint8_t *bytes, uint8_t transfer)
+{
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const uint8_t place = arb_call_device(call, bytes);
+    if (place == PDCP_NONE || nodes->nodes[place].state != PDCP_NODE_READY) {
+        return PDCP_NONE;
+    }
+    const uint8_t number = pdcp_nodes_channel(nodes, place, bytes[6]);
+    return number != PDCP_NONE && nodes->channels[number].transfer == transfer ? number : PDCP_NONE;
+}
+
+uint8_t arb_call_error(int8_t status)
+{
+    switch (status) {
+    case PDCP_OK:
+        return ARB_OK;
+    case PDCP_ERR_REFUSED:
+        return ARB_ERR_REFUSED;
+    case PDCP_ERR_BULK:
+        return ARB_ERR_BULK;
+    case PDCP_ERR_BUSY:
+        return ARB_ERR_BUSY;
+    default:
+        return ARB_ERR_NO_ANSWER;
+    }
+}

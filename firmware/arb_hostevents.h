@@ -1,0 +1,87 @@
+/* The event stream to the host (2416h and 2419h, host-api.md 3): what happens on the bus, as messages that
+ * nobody asked for. Nothing is sent to a host that has not asked for the stream.
+ *
+ * Events wait in a ring; one that finds no room is dropped and counted by its kind. CAN frames get no more
+ * than a part of the ring, so that at full bus load the other kinds still find room. The answers to requests
+ * go first: arb_hostapi.c takes a message from here only when no answer waits, so that an answer never waits
+ * for more than the rest of one message, 30 bytes. */
+#ifndef ARB_HOSTEVENTS_H
+#define ARB_HOSTEVENTS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "arb_hostcodec.h"
+#include "pdcp_arb.h"
+
+typedef enum {
+    ARB_EVENT_BOUND = 1,     /* dev, node8 */
+    ARB_EVENT_LOST = 2,      /* dev, node8 */
+    ARB_EVENT_LINK = 3,      /* output chan, input chan, status8 (0: gone) */
+    ARB_EVENT_CONFIG = 4,    /* active8, stored8 */
+    ARB_EVENT_FRAME = 5,     /* id16, DLC8, DLC bytes of data; of both directions */
+    ARB_EVENT_BUS_STATE = 6, /* state8 (arb_bus_state_t), transmit errors8, receive errors8 */
+    ARB_EVENT_KINDS = 6
+} arb_event_kind_t;
+
+typedef enum { ARB_BUS_ACTIVE = 0, ARB_BUS_PASSIVE = 1, ARB_BUS_OFF = 2, ARB_BUS_SILENT = 3 } arb_bus_state_t;
+
+enum {
+    ARB_EVENT_HEAD = 5,      /* kind8, time32 */
+    ARB_EVENT_DATA_MAX = 15, /* a link */
+    ARB_EVENT_RING = 192,    /* bytes; 9 to 17 events */
+    ARB_EVENT_FRAMES = 64    /* bytes of the ring beyond which no CAN frame is taken */
+};
+
+typedef struct {
+    uint8_t mask;      /* bit k: kind k + 1 is wanted; 0: the stream is off */
+    uint8_t tx_errors; /* of the controller, as told last */
+    uint8_t rx_errors;
+    uint8_t first; /* byte of the ring where the oldest event begins */
+    uint8_t used;  /* bytes of the ring */
+    uint8_t ring[ARB_EVENT_RING];
+    uint8_t message[ARB_HOST_HEADER + ARB_EVENT_HEAD + ARB_EVENT_DATA_MAX + ARB_HOST_CRC];
+    uint8_t message_len; /* of the message being sent; 0: none */
+    uint8_t message_sent;
+    uint32_t sent;
+    uint32_t dropped[ARB_EVENT_KINDS]; /* by kind, from kind 1 on */
+} arb_hostevents_t;
+
+/* Bits of the kinds that there are. */
+#define ARB_EVENT_MASK ((1u << ARB_EVENT_KINDS) - 1u)
+
+static inline bool arb_hostevents_wants(const arb_hostevents_t *events, arb_event_kind_t kind)
+{
+    return (events->mask & (1u << (kind - 1))) != 0;
+}
+
+/* From now on these kinds; events of others that still wait are never sent. */
+void arb_hostevents_set_mask(arb_hostevents_t *events, uint8_t mask);
+
+/* The host is gone: whoever comes next has not asked for anything. */
+void arb_hostevents_end(arb_hostevents_t *events);
+
+/* An event of the arbitrator; those that are of no kind, or of one that is not wanted, are ignored. */
+void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
+                             const pdcp_event_t *event);
+
+/* A frame on the bus, received or sent. Only base frames are events. */
+void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const can_frame_t *frame);
+
+/* Another active configuration, or another number of stored ones. */
+void arb_hostevents_on_config(arb_hostevents_t *events, uint32_t now_ms, uint8_t active, uint8_t stored);
+
+/* Makes the oldest event the message being sent, if none is. True: message[] holds one, from message_sent on
+ * it is still to be sent. */
+bool arb_hostevents_next(arb_hostevents_t *events);
+
+/* So many more bytes of the message were taken. */
+void arb_hostevents_taken(arb_hostevents_t *events, uint8_t count);
+
+/* Is something to be sent? */
+static inline bool arb_hostevents_wait(const arb_hostevents_t *events)
+{
+    return events->message_len != 0 || events->used != 0;
+}
+
+#endif

@@ -1,0 +1,103 @@
+/* The limb that configures itself: joins the profile layer (profile_run.h), the stored configurations
+ * (arb_config.h) and the stored flags (arb_flags.h) with the arbitrator, and carries out the host's profile
+ * actions (host-api.md 3, profile-layer.md 4). */
+#ifndef ARB_LIMB_H
+#define ARB_LIMB_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "arb_config.h"
+#include "arb_flags.h"
+#include "arb_hostcodec.h"
+#include "pdcp_arb.h"
+#include "profile_run.h"
+
+enum {
+    ARB_LIMB_AUTO_SAVE_MS = 5000 /* after the last change (profile-layer.md 4) */
+};
+
+/* 2407h */
+typedef enum {
+    ARB_ACTION_NONE = 0,
+    ARB_ACTION_SAVE = 1, /* argument: configuration, 0 = the active one */
+    ARB_ACTION_LOAD = 2,
+    ARB_ACTION_ERASE = 3,
+    ARB_ACTION_AUTOCONFIGURE = 4,
+    ARB_ACTION_CLEAR = 5,
+    ARB_ACTION_ENFORCE = 6,
+    ARB_ACTION_REPLACE = 7,
+    ARB_ACTION_ADOPT = 8
+} arb_action_t;
+
+typedef struct {
+    profile_run_t run;
+    arb_config_t config;
+    arb_flags_t flags;
+    uint8_t flags_on; /* given on the command line: not stored */
+    uint8_t flags_off;
+    uint8_t active; /* configuration, 0: none */
+    uint8_t stage;  /* arb_limb.c: what is under way */
+    uint8_t number; /* configuration that is being saved, loaded or erased */
+    bool done;      /* a job of arb_config has ended, with status */
+    int8_t status;  /* arb_config_status_t */
+    bool for_host;  /* the host waits for the outcome */
+    bool ended;     /* the outcome is there */
+    uint8_t error;  /* arb_error_t */
+    uint16_t result;
+    bool told;          /* active and stored configurations are as the host knows them */
+    bool unsaved;       /* the configuration was changed, for auto-save */
+    uint8_t plan_error; /* of the action that the plan under way is for */
+    bool overflow;      /* the configuration has more devices than there is room for */
+    uint32_t changed_ms;
+    /* Start-up: the score of the configuration that is being read and of the best one so far (D-PRO-4). */
+    uint8_t best;
+    uint8_t both;
+    uint8_t one;
+    uint8_t best_both;
+    uint8_t best_one;
+    const pdcp_arb_t *arb; /* while the memory is being read */
+} arb_limb_t;
+
+/* flags_on and flags_off override what is stored. Reads the memory: may block for as long as that takes. */
+void arb_limb_init(arb_limb_t *limb, arb_nvm_t *nvm, uint8_t flags_on, uint8_t flags_off, uint32_t now_ms);
+
+/* An event of the arbitrator; hand all of them in. */
+void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms, const pdcp_event_t *event);
+
+/* Does what is due. True: the arbitrator was given something to do. */
+bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t now_ms);
+
+/* The time of the next call at the latest. */
+uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms);
+
+/* Is a plan or an action under way? 2307h, 2407h and 2410h wait for its end (D-API-6). */
+bool arb_limb_is_busy(const arb_limb_t *limb);
+
+/* Begins an action for the host; nothing may be under way. ARB_OK: arb_limb_take_outcome will say how it
+ * went. Otherwise an error, and nothing was begun: ARB_ERR_NUMBER, no such configuration; ARB_ERR_VALUE, no
+ * such action; ARB_ERR_BUSY, try again. */
+uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t action, uint8_t argument);
+
+/* True, once, when the action has ended: error is ARB_OK or an error, result what 2408h says. */
+bool arb_limb_take_outcome(arb_limb_t *limb, uint8_t *error, uint16_t *result);
+
+/* 2404h: bits 0 to 3, stored. */
+void arb_limb_set_flags(arb_limb_t *limb, uint32_t now_ms, uint8_t flags);
+
+/* The flags as they are in force, bits 0 to 3. */
+uint8_t arb_limb_flags(const arb_limb_t *limb);
+
+/* Profile state of 2401h. */
+static inline uint8_t arb_limb_state(const arb_limb_t *limb)
+{
+    return limb->run.state;
+}
+
+/* True, once: the active configuration or the stored ones are not what they were (event 4). */
+bool arb_limb_take_change(arb_limb_t *limb);
+
+/* The host has written the stored configurations (240Dh). */
+void arb_limb_on_written(arb_limb_t *limb);
+
+#endif

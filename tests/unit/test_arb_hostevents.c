@@ -1,0 +1,396 @@
+/* The event stream (2416h, 2419h; D-API-5): what is told, in which bytes, and that answers never wait for it.
+ */
+#include <string.h>
+
+#include "hostlink.h"
+#include "unity.h"
+
+#define DEV_OUT 2, 0, 2, 0, 4, 0 /* 0002:0002:0004, id 11h, output 1 */
+#define DEV_IN 2, 0, 2, 0, 6, 0  /* 0002:0002:0006, id 12h, input 1 */
+#define BYTES HOSTLINK_BYTES
+#define TIME 0x00, 0xFF, 0xFF, 0xFF /* hostlink_start's, LSB first */
+
+static exchange_t x;
+static arb_app_t app;
+
+void setUp(void)
+{
+    hostlink_start(&x, &app, false);
+}
+
+void tearDown(void) {}
+
+static void subscribe(uint8_t mask)
+{
+    hostlink_ask(&x, 0x2416, 1, &mask, 1);
+    hostlink_answer(0x2417, 1, NULL, 0);
+}
+
+static void expect_event(const uint8_t *payload, uint16_t len)
+{
+    hostlink_answer(0x2419, 0, payload, len);
+}
+
+/* D-API-5: nothing unasked to a host that never used the group. */
+static void test_nothing_is_sent_unasked(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_PASSIVE);
+    exchange_pass(&x, 3000);
+    (void)exchange_drain(&x);
+    hostlink_silence();
+    TEST_ASSERT_EQUAL(0, app.api.events.used);
+}
+
+/* A whole message; its checksums were computed apart. */
+static void test_bytes(void)
+{
+    subscribe(0x10);
+    exchange_rx(&x, "02A#0A");
+    hostlink_expect("FE 19 19 24 00 48 0B 00 05 00 FF FF FF 2A 00 01 0A 41 09");
+    hostlink_silence();
+}
+
+static void test_devices_come_and_go(void)
+{
+    subscribe(0x03);
+    exchange_add_output(&x, "FE");
+    expect_event(BYTES(1, TIME, DEV_OUT, 0x11));
+    hostlink_silence();
+    exchange_wait(&x, 1500);
+    expect_event(BYTES(2, 0xDC, 0x04, 0, 0, DEV_OUT, 0x11));
+    subscribe(0x01);
+    exchange_rx(&x, "011#0A"); /* it is back */
+    expect_event(BYTES(1, 0xDC, 0x04, 0, 0, DEV_OUT, 0x11));
+    exchange_wait(&x, 1500);
+    hostlink_silence(); /* of a kind that is not wanted */
+}
+
+static void make_link(void)
+{
+    static const exchange_pair_t making[] = {
+        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
+        {"312#04 06 01 0400 01", "212#84 01 06 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
+        {"312#04 07 01 11 FE", "212#84 01 07 01"},
+        {"312#04 04 01 01", "212#84 01 04 01"},
+        {"311#04 04 01 01", "211#84 01 04 01"},
+        {NULL, NULL},
+    };
+    hostlink_ask(&x, 0x2307, 7, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    exchange_run(&x, making);
+}
+
+/* Also which output it was, when a link is gone. */
+static void test_links_change(void)
+{
+    static const exchange_pair_t removing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01"},        {"312#04 07 01 0000", "212#84 01 07 01"},
+        {"312#04 08 01 0000 0000", "212#84 01 08 01"}, {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
+        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"}, {NULL, NULL},
+    };
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    subscribe(0x04);
+    make_link();
+    hostlink_answer(0x2308, 7, BYTES(2)); /* the answer goes first */
+    expect_event(BYTES(3, TIME, DEV_OUT, 1, DEV_IN, 1, 2));
+    hostlink_ask(&x, 0x2410, 8, BYTES(DEV_IN, 1));
+    exchange_pairs(&x, removing);
+    hostlink_answer(0x2411, 8, NULL, 0);
+    expect_event(BYTES(3, TIME, DEV_OUT, 1, DEV_IN, 1, 0));
+    hostlink_silence();
+}
+
+static void test_the_configuration_changes(void)
+{
+    subscribe(0x08);
+    arb_limb_on_written(&app.limb);
+    app.work = true;
+    exchange_step(&x);
+    expect_event(BYTES(4, TIME, 0, 0));
+    hostlink_silence();
+}
+
+/* Frames of both directions; only base frames. */
+static void test_frames(void)
+{
+    static const can_frame_t extended = {.kind = CAN_FRAME_EXTENDED, .dlc = 8};
+    subscribe(0x10);
+    exchange_rx(&x, "7FF#0102030405060708");
+    expect_event(BYTES(5, TIME, 0xFF, 7, 8, 1, 2, 3, 4, 5, 6, 7, 8));
+    exchange_rx(&x, "123#");
+    expect_event(BYTES(5, TIME, 0x23, 1, 0));
+    arb_app_on_frame(&app, x.now_ms, &extended);
+    exchange_step(&x);
+    hostlink_silence();
+}
+
+static bool takes(void *ctx, const can_frame_t *frame)
+{
+    (void)ctx;
+    (void)frame;
+    return true;
+}
+
+static void test_frames_that_are_sent(void)
+{
+    arb_port_t sending = *app.port;
+    sending.can_send = takes;
+    subscribe(0x10);
+    app.port = &sending;
+    exchange_wait(&x, 500);
+    expect_event(BYTES(5, 0xF4, 0, 0, 0, 0, 1, 1, 0x0A));
+    hostlink_silence();
+}
+
+static void test_the_bus_has_another_state(void)
+{
+    subscribe(0x20);
+    arb_app_on_errors(&app, 130, 7);
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_PASSIVE);
+    exchange_step(&x);
+    expect_event(BYTES(6, TIME, 1, 130, 7));
+    arb_app_on_errors(&app, 255, 7);
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_OFF);
+    exchange_step(&x);
+    expect_event(BYTES(6, TIME, 2, 255, 7));
+    arb_app_on_errors(&app, 0, 0);
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_ACTIVE);
+    exchange_step(&x);
+    expect_event(BYTES(6, TIME, 0, 0, 0));
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_DOWN);
+    exchange_step(&x);
+    expect_event(BYTES(6, TIME, 2, 0, 0));
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_ACTIVE);
+    exchange_step(&x);
+    expect_event(BYTES(6, TIME, 0, 0, 0));
+    exchange_rx(&x, "100#0A"); /* another arbitrator was there first (D-BUS-12) */
+    expect_event(BYTES(6, TIME, 3, 0, 0));
+    exchange_wait(&x, 2250);
+    expect_event(BYTES(6, 0xCA, 0x07, 0, 0, 0, 0, 0));
+    hostlink_silence();
+}
+
+static void test_masks(void)
+{
+    hostlink_ask(&x, 0x2416, 1, BYTES(0x40));
+    hostlink_answer(0x2418, 1, BYTES(0x0F));
+    subscribe(0x10);
+    exchange_rx(&x, "02A#0A");
+    hostlink_ask(&x, 0x2416, 2, BYTES(0));
+    expect_event(BYTES(5, TIME, 0x2A, 0, 1, 0x0A));
+    hostlink_answer(0x2417, 2, NULL, 0);
+    exchange_rx(&x, "02A#0A");
+    hostlink_silence();
+}
+
+/* After the answer to a mask no event of another kind comes, not even one that waited. */
+static void test_what_waits_when_the_mask_changes(void)
+{
+    subscribe(0x30);
+    hostlink_room(0);
+    exchange_rx(&x, "02A#0A");
+    exchange_rx(&x, "02B#0A");
+    arb_app_on_state(&app, x.now_ms, PDCP_BUS_PASSIVE);
+    exchange_step(&x);
+    hostlink_ask(&x, 0x2416, 2, BYTES(0x20));
+    hostlink_room(1000);
+    exchange_step(&x);
+    hostlink_answer(0x2417, 2, NULL, 0);
+    expect_event(BYTES(6, TIME, 1, 0, 0));
+    hostlink_silence();
+    TEST_ASSERT_EQUAL(1, app.api.events.sent);
+    TEST_ASSERT_EQUAL(0, app.api.events.dropped[4]);
+}
+
+/* An event of which the first bytes have left is sent to its end, then the answer, then the other events. */
+static void test_no_message_is_torn_and_answers_go_first(void)
+{
+    subscribe(0x10);
+    hostlink_room(5);
+    for (int i = 0; i < 3; i++) {
+        exchange_rx(&x, "02A#0A");
+    }
+    hostlink_ask(&x, 0x2201, 9, NULL, 0);
+    hostlink_room(1000);
+    exchange_step(&x);
+    expect_event(BYTES(5, TIME, 0x2A, 0, 1, 0x0A));
+    hostlink_answer(0x2202, 9, BYTES(0, 0, 0, 0));
+    expect_event(BYTES(5, TIME, 0x2A, 0, 1, 0x0A));
+    expect_event(BYTES(5, TIME, 0x2A, 0, 1, 0x0A));
+    hostlink_silence();
+}
+
+static size_t writes_three(void *ctx, const uint8_t *bytes, size_t size)
+{
+    const arb_port_t *const *whole = ctx;
+    return (*whole)->host_write((*whole)->ctx, bytes, size < 3 ? size : 3);
+}
+
+/* A driver that takes three bytes at a time, whatever it is offered. */
+static void test_no_message_is_torn_by_a_driver_that_takes_little(void)
+{
+    const arb_port_t *whole = app.port;
+    arb_port_t little = *whole;
+    const uint8_t *payload;
+    uint16_t len;
+    unsigned answers = 0;
+    little.ctx = &whole;
+    little.host_write = writes_three;
+    subscribe(0x10);
+    app.port = &little;
+    for (int i = 0; i < 200; i++) {
+        exchange_rx(&x, "02A#0102030405060708");
+        if (i % 20 == 0) {
+            hostlink_ask(&x, 0x2201, (uint8_t)i, NULL, 0);
+        }
+        uint16_t id;
+        while ((id = hostlink_take(&payload, &len)) != 0) {
+            answers += id == 0x2202 ? 1 : 0;
+            TEST_ASSERT_TRUE(id == 0x2202 || id == 0x2419);
+        }
+    }
+    TEST_ASSERT_EQUAL(10, answers);
+}
+
+/* What finds no room is dropped and counted by its kind; frames leave room for the others. */
+static void test_events_are_dropped_and_counted(void)
+{
+    subscribe(0x30);
+    hostlink_room(0);
+    for (int i = 0; i < 100; i++) {
+        exchange_rx(&x, "02A#0102030405060708");
+    }
+    TEST_ASSERT_EQUAL(0, app.api.events.dropped[5]);
+    TEST_ASSERT_GREATER_THAN(90, app.api.events.dropped[4]);
+    for (int i = 0; i < 40; i++) {
+        arb_app_on_state(&app, x.now_ms, i % 2 == 0 ? PDCP_BUS_PASSIVE : PDCP_BUS_ACTIVE);
+    }
+    TEST_ASSERT_GREATER_THAN(10, app.api.events.dropped[5]);
+    const uint32_t dropped = app.api.events.dropped[4] + app.api.events.dropped[5];
+    hostlink_room(4000);
+    exchange_step(&x);
+    uint32_t came = 0;
+    const uint8_t *payload;
+    uint16_t len;
+    while (hostlink_take(&payload, &len) == 0x2419) {
+        came++;
+    }
+    TEST_ASSERT_EQUAL(140, came + dropped);
+    TEST_ASSERT_EQUAL(came, app.api.events.sent);
+    hostlink_silence();
+}
+
+/* A host that has gone takes its stream with it: the next one has asked for nothing. */
+static void test_the_stream_ends_with_its_host(void)
+{
+    subscribe(0x10);
+    hostlink_room(0);
+    exchange_rx(&x, "02A#0A");
+    arb_app_on_host_gone(&app);
+    hostlink_room(1000);
+    exchange_rx(&x, "02A#0A");
+    hostlink_silence();
+    TEST_ASSERT_EQUAL(0, app.api.events.mask);
+}
+
+/* --- full bus load over 128000 baud --- */
+
+#ifdef __AVR__
+enum { LOAD_MS = 150 };
+#else
+enum { LOAD_MS = 5000 };
+#endif
+
+/* A line that carries 12.8 bytes a ms and whose driver takes up to 20 ms ahead. */
+typedef struct {
+    uint32_t written; /* bytes that the application has handed over */
+    uint32_t sent_10; /* tenths of bytes that have left */
+} line_t;
+
+static const uint32_t ahead = 256;
+
+static void carry(line_t *line)
+{
+    line->sent_10 += 128;
+    if (line->sent_10 > line->written * 10) {
+        line->sent_10 = line->written * 10;
+    }
+    hostlink_room(ahead - (line->written - line->sent_10 / 10));
+}
+
+static void load_one_ms(line_t *line)
+{
+    carry(line);
+    const size_t room = hostlink_room_left();
+    x.now_ms++;
+    for (int i = 0; i < 8; i++) { /* 1 Mbit/s: a frame of 8 bytes takes 125 us */
+        const can_frame_t frame = exchange_frame("2A5#0102030405060708");
+        arb_app_on_frame(&app, x.now_ms, &frame);
+        exchange_step(&x);
+    }
+    line->written += (uint32_t)(room - hostlink_room_left());
+    (void)exchange_drain(&x);
+}
+
+/* Every request that is served from the tables has its answer, to the last byte on the line, within 50 ms. */
+static void test_answers_at_full_bus_load(void)
+{
+    static const uint16_t ids[] = {0x2201, 0x2204, 0x2207, 0x220A, 0x220D, 0x2401, 0x2413};
+    line_t line = {0, 0};
+    uint32_t taken = 0; /* bytes looked at so far */
+    uint32_t end = 0;   /* where the answer ends in the stream; 0: it has not been handed over */
+    uint32_t asked = 0; /* requests */
+    uint32_t since = 0; /* ms since the last one */
+    uint32_t worst = 0;
+    subscribe(0x3F);
+    hostlink_ask(&x, 0x2201, 0, NULL, 0);
+    for (int ms = 0; ms < LOAD_MS; ms++) {
+        load_one_ms(&line);
+        since++;
+        const uint8_t *payload;
+        uint16_t len;
+        uint16_t id;
+        while ((id = hostlink_take(&payload, &len)) != 0) {
+            taken += 8u + (len != 0 ? len + 2u : 0u);
+            end = id != 0x2419 ? taken : end;
+        }
+        if (end != 0 && line.sent_10 >= end * 10) {
+            worst = since > worst ? since : worst;
+            end = 0;
+            since = 0;
+            asked++;
+            const uint16_t what = ids[asked % 7];
+            const uint8_t group = 0;
+            hostlink_ask(&x, what, (uint8_t)asked, &group, what == 0x2201 || what == 0x2401 ? 0 : 1);
+        }
+        TEST_ASSERT_LESS_OR_EQUAL(50, since);
+    }
+    TEST_ASSERT_GREATER_THAN(LOAD_MS / 50, asked);
+    TEST_ASSERT_GREATER_THAN(20, worst); /* the line was full */
+    TEST_ASSERT_GREATER_THAN(LOAD_MS * 7, app.api.events.dropped[4]);
+    TEST_ASSERT_GREATER_THAN(LOAD_MS / 4, app.api.events.sent);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_nothing_is_sent_unasked);
+    RUN_TEST(test_bytes);
+    RUN_TEST(test_devices_come_and_go);
+    RUN_TEST(test_links_change);
+    RUN_TEST(test_the_configuration_changes);
+    RUN_TEST(test_frames);
+    RUN_TEST(test_frames_that_are_sent);
+    RUN_TEST(test_the_bus_has_another_state);
+    RUN_TEST(test_masks);
+    RUN_TEST(test_what_waits_when_the_mask_changes);
+    RUN_TEST(test_no_message_is_torn_and_answers_go_first);
+    RUN_TEST(test_no_message_is_torn_by_a_driver_that_takes_little);
+    RUN_TEST(test_events_are_dropped_and_counted);
+    RUN_TEST(test_the_stream_ends_with_its_host);
+    RUN_TEST(test_answers_at_full_bus_load);
+    return UNITY_END();
+}

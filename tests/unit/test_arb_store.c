@@ -1,0 +1,207 @@
+/* What the application keeps over a power cycle: identities and their node ids (D-BUS-6). */
+#include <string.h>
+
+#include "arb_app.h"
+#include "exchange.h"
+#include "unity.h"
+
+static exchange_t x;
+static arb_app_t app;
+
+/* Of each area only the beginning is kept: no test writes more, and a small machine holds two of these. */
+enum { KEPT = 256 };
+
+static uint8_t memory[ARB_STORE_AREAS * KEPT];
+static int writes_left; /* before the power fails; -1: it does not */
+static size_t bytes_left_of_last;
+
+static bool can_send(void *ctx, const can_frame_t *frame)
+{
+    (void)ctx;
+    (void)frame;
+    return false; /* exchange.c takes them from the queue */
+}
+
+static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
+{
+    (void)ctx;
+    (void)bytes;
+    return size; /* there is no host */
+}
+
+/* Where a byte of the identities stands; NULL: it is not kept. */
+static uint8_t *byte_of(uint16_t address)
+{
+    const uint16_t area = (uint16_t)(address / ARB_STORE_AREA);
+    const uint16_t at = (uint16_t)(address % ARB_STORE_AREA);
+    return area < ARB_STORE_AREAS && at < KEPT ? &memory[area * KEPT + at] : NULL;
+}
+
+static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
+{
+    (void)ctx;
+    for (uint16_t i = 0; i < size; i++) { /* all others are empty */
+        const uint8_t *byte = byte_of((uint16_t)(address + i));
+        bytes[i] = byte != NULL ? *byte : 0xFF;
+    }
+    return true;
+}
+
+static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
+{
+    (void)ctx;
+    TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(ARB_PORT_NVM_PAGE, address % ARB_PORT_NVM_PAGE + size,
+                                      "crosses a page");
+    uint8_t *page = byte_of(address);
+    TEST_ASSERT_NOT_NULL_MESSAGE(page, "this memory is too small for the test");
+    if (writes_left == 0) {
+        memcpy(page, bytes, bytes_left_of_last < size ? bytes_left_of_last : size);
+        bytes_left_of_last = 0;
+        return true;
+    }
+    writes_left -= writes_left > 0 ? 1 : 0;
+    memcpy(page, bytes, size);
+    return true;
+}
+
+static int8_t nvm_status(void *ctx)
+{
+    (void)ctx;
+    return 0;
+}
+
+static const arb_port_t port = {.can_send = can_send,
+                                .host_write = host_write,
+                                .nvm_read = nvm_read,
+                                .nvm_write = nvm_write,
+                                .nvm_status = nvm_status};
+
+static void start(void)
+{
+    const arb_settings_t settings = {.no_autoconfig = true};
+    exchange_start_app(&x, &app, &port, &settings, 0xFFFFFF00u);
+}
+
+void setUp(void)
+{
+    memset(memory, 0xFF, sizeof memory);
+    writes_left = -1;
+    start();
+}
+
+void tearDown(void) {}
+
+/* D-BUS-6: also after a power cycle. */
+static void test_identities_outlive_a_power_cycle(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    exchange_pass(&x, 600);
+    TEST_ASSERT_FALSE(app.store.changed);
+    start();
+    TEST_ASSERT_EQUAL(2, app.arb.bind.remembered_count);
+    exchange_rx(&x, "655#01 0200 0200 0400");
+    exchange_tx(&x, "355#81 11 0200 0200 0400");
+}
+
+static void test_unchanged_identities_are_not_written_again(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_pass(&x, 600);
+    start();
+    uint8_t before[sizeof memory];
+    memcpy(before, memory, sizeof memory);
+    exchange_add_output(&x, "FE");
+    exchange_pass(&x, 2000);
+    TEST_ASSERT_EQUAL_MEMORY(before, memory, sizeof memory);
+}
+
+/* Power fails at every byte of the write that adds the second identity: afterwards there are one or two,
+ * never none. */
+static void test_power_may_fail_at_any_byte(void)
+{
+    uint8_t before[sizeof memory];
+    exchange_add_output(&x, "FE");
+    exchange_pass(&x, 600);
+    memcpy(before, memory, sizeof memory);
+    int old = 0;
+    int fresh = 0;
+    for (size_t cut = 0; cut <= ARB_STORE_HEADER + 2 * ARB_STORE_ENTRY + ARB_STORE_CRC; cut++) {
+        memcpy(memory, before, sizeof memory);
+        writes_left = -1;
+        start();
+        exchange_add_input(&x);
+        writes_left = 0;
+        bytes_left_of_last = cut;
+        exchange_pass(&x, 600);
+        start();
+        const uint8_t count = app.arb.bind.remembered_count;
+        TEST_ASSERT_TRUE(count == 1 || count == 2);
+        TEST_ASSERT_EQUAL_HEX8(0x11, app.arb.bind.remembered[count - 1].node_id);
+        old += count == 1 ? 1 : 0;
+        fresh += count == 2 ? 1 : 0;
+    }
+    TEST_ASSERT_EQUAL(1, fresh);
+    TEST_ASSERT_GREATER_THAN(20, old);
+}
+
+/* Bit rot in either area: the other one is used, and it is seen. */
+static void test_a_damaged_copy_is_seen_and_not_used(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_pass(&x, 600);
+    exchange_add_input(&x);
+    exchange_pass(&x, 600);
+    uint8_t good[sizeof memory];
+    memcpy(good, memory, sizeof memory);
+    for (unsigned area = 0; area < ARB_STORE_AREAS; area++) {
+        for (unsigned byte = 2; byte < 17; byte++) {
+            memcpy(memory, good, sizeof memory);
+            memory[area * KEPT + byte] ^= 0x10;
+            start();
+            TEST_ASSERT_EQUAL(1, app.store.damaged);
+            TEST_ASSERT_GREATER_OR_EQUAL(1, app.arb.bind.remembered_count);
+        }
+    }
+}
+
+/* What stands on the memory, from the table in arb_store.h; CRC-32 of the 13 bytes computed apart. */
+static void test_the_stored_bytes(void)
+{
+    static const uint8_t want[] = {'P', 'I', 1, 1, 1, 0, 2, 0, 2, 0, 4, 0, 0x11, 0x48, 0x96, 0xE5, 0x12};
+    exchange_add_output(&x, "FE");
+    exchange_pass(&x, 600);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(want, memory, sizeof want);
+}
+
+/* A known device binds between two pages of a write: the order of the table changes, and what is stored is
+ * still whole. */
+static void test_a_bind_between_two_pages(void)
+{
+    for (uint8_t i = 0; i < 24; i++) {
+        const pdcp_remembered_t entry = {.identity = {7, 7, (uint16_t)(100 + i)},
+                                         .node_id = (uint8_t)(0x60 + i)};
+        TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&app.arb.bind, &entry));
+    }
+    exchange_rx(&x, "650#01 0900 0900 0900");
+    (void)exchange_drain(&x);
+    exchange_pass(&x, 506); /* 500 ms, then a page each 5 ms */
+    exchange_rx(&x, "660#01 0700 0700 6400");
+    exchange_pass(&x, 400);
+    TEST_ASSERT_FALSE(app.store.changed);
+    start();
+    TEST_ASSERT_EQUAL(0, app.store.damaged);
+    TEST_ASSERT_EQUAL(25, app.arb.bind.remembered_count);
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_identities_outlive_a_power_cycle);
+    RUN_TEST(test_unchanged_identities_are_not_written_again);
+    RUN_TEST(test_power_may_fail_at_any_byte);
+    RUN_TEST(test_a_damaged_copy_is_seen_and_not_used);
+    RUN_TEST(test_the_stored_bytes);
+    RUN_TEST(test_a_bind_between_two_pages);
+    return UNITY_END();
+}

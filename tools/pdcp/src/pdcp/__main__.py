@@ -1,0 +1,5 @@
+"""python -m pdcp."""
+
+from .cli import main
+
+main()

@@ -1,0 +1,192 @@
+"""What all commands share: the connection, tables or JSON, and one place that turns errors into exit codes."""
+
+import json
+import os
+import sys
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Annotated, Any
+
+import typer
+from rich import box
+from rich.console import Console, RenderableType
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
+from rich.table import Table
+from typer.exceptions import Abort, Exit, TyperException
+
+from ..client import Client
+from ..errors import BadAnswerError, ConnectionFailedError, NoAnswerError, PdcpError
+from ..messages import FormatError
+
+PIPE_WIDTH = 500  # columns: a row stays one line where no terminal limits it
+PROGRESS_AFTER_S = 1.0
+
+Json = dict[str, Any]
+
+
+class Status(IntEnum):
+    """Exit codes."""
+
+    OK = 0
+    REFUSED = 1  # the arbitrator said no, or something failed on the way
+    USAGE = 2
+    NO_CONNECTION = 3
+    TIMEOUT = 4
+    INTERRUPTED = 130
+
+
+class CommandError(Exception):
+    """A command cannot go on; the text is the one line that the user gets."""
+
+    def __init__(self, message: str, status: Status = Status.REFUSED) -> None:
+        super().__init__(message)
+        self.status = status
+
+
+class UsageFault(CommandError):
+    """Wrong arguments."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message, Status.USAGE)
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The options before the command."""
+
+    port: str | None
+    baud: int
+    timeout_s: float
+    json: bool
+
+
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
+
+
+def settings(ctx: typer.Context) -> Settings:
+    found = ctx.find_object(Settings)
+    assert found is not None, "the callback of the application has set it"
+    return found
+
+
+def connect(ctx: typer.Context) -> Client:
+    """A client at the port that the user named; use it in a with statement."""
+    options = settings(ctx)
+    if options.port is None:
+        raise UsageFault("no port: give --port PATH or set PDCP_PORT; 'pdcp ports' shows what there is")
+    return Client(options.port, options.baud, timeout_s=options.timeout_s)
+
+
+def wants_json(ctx: typer.Context, as_json: bool) -> bool:
+    """--json may stand before the command or behind it."""
+    return as_json or settings(ctx).json
+
+
+def new_console(stderr: bool = False) -> Console:
+    """A console for tables. Without a terminal lines are as long as they need to be, unless COLUMNS says otherwise."""
+    console = Console(stderr=stderr, highlight=False, emoji=False)
+    if not console.is_terminal and "COLUMNS" not in os.environ:
+        console.width = PIPE_WIDTH
+    return console
+
+
+def new_table(title: str = "") -> Table:
+    """An empty table in the style of all others. Escape text of devices with rich.text.Text or rich.markup.escape."""
+    return Table(
+        title=title or None,
+        title_style="bold",
+        title_justify="left",
+        header_style="dim",
+        box=box.SIMPLE_HEAD,
+        padding=(0, 1, 0, 0),
+        pad_edge=False,
+    )
+
+
+def print_json(data: object) -> None:
+    """One JSON document, indented on a terminal, one line otherwise."""
+    json.dump(data, sys.stdout, ensure_ascii=False, indent=2 if sys.stdout.isatty() else None)
+    sys.stdout.write("\n")
+    sys.stdout.flush()
+
+
+def show(ctx: typer.Context, as_json: bool, data: object, *tables: RenderableType) -> None:
+    """Prints the data as JSON where that is wanted, else the tables."""
+    if wants_json(ctx, as_json):
+        print_json(data)
+        return
+    console = new_console()
+    for table in tables:
+        console.print(table)
+
+
+@contextmanager
+def waiting(what: str, total: int | None = None) -> Iterator[Callable[..., None]]:
+    """A progress bar on a terminal's standard error, once it has taken longer than a second. What it yields is to be
+    called for each step, or as step(done, total)."""
+    console = new_console(stderr=True)
+    if not console.is_terminal:
+        yield lambda *_: None
+        return
+    columns = [TextColumn("{task.description}"), BarColumn(), TimeElapsedColumn()]
+    progress = Progress(*columns, console=console, transient=True)
+    task = progress.add_task(what, total=total)
+
+    def step(done: int | None = None, of: int | None = None) -> None:
+        if done is None:
+            progress.advance(task)
+        else:
+            progress.update(task, completed=done, total=of)
+
+    timer = threading.Timer(PROGRESS_AFTER_S, progress.start)
+    timer.daemon = True
+    timer.start()
+    try:
+        yield step
+    finally:
+        timer.cancel()
+        timer.join()  # it may just be starting
+        progress.stop()
+
+
+def _complain(text: str, status: Status) -> int:
+    line = " ".join(text.split())
+    sys.stderr.write(f"pdcp: {line}\n")
+    return status
+
+
+def _status_of(error: PdcpError) -> Status:
+    if isinstance(error, NoAnswerError):
+        return Status.TIMEOUT
+    if isinstance(error, ConnectionFailedError | BadAnswerError):
+        return Status.NO_CONNECTION
+    return Status.REFUSED
+
+
+def run(app: typer.Typer, arguments: Sequence[str]) -> int:
+    """Runs the application and returns its exit code; whatever went wrong is one line on standard error."""
+    try:
+        status = app(args=list(arguments), prog_name="pdcp", standalone_mode=False)
+        sys.stdout.flush()
+        return status if isinstance(status, int) else Status.OK
+    except Exit as end:
+        return end.exit_code
+    except (Abort, KeyboardInterrupt):
+        return Status.INTERRUPTED
+    except CommandError as error:
+        return _complain(str(error), error.status)
+    except PdcpError as error:
+        return _complain(str(error), _status_of(error))
+    except FormatError as error:  # a value that no message can carry
+        return _complain(str(error), Status.USAGE)
+    except TyperException as error:
+        return _complain(f"{error.format_message()} ('pdcp --help' tells more)", Status.USAGE)
+    except BrokenPipeError:
+        # The reader has gone; the interpreter flushes standard output once more at its end.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return Status.REFUSED
+    except OSError as error:
+        return _complain(str(error), Status.REFUSED)

@@ -1,0 +1,201 @@
+"""Commands that ask and tell devices: get, set, suspend, release, reset, passthrough."""
+
+from typing import Annotated
+
+import typer
+from rich.text import Text
+
+from ..client import Client
+from ..model import BROADCAST, ChannelId, Identity, parse_number
+from ..parameters import PARAMETERS, TRANSFER_TYPE, Kind, Parameter, find
+from . import targets
+from .common import Json, JsonOption, UsageFault, connect, show, waiting
+from .tables import parameter_grid, parameter_json, parameters_json, read_parameters
+
+CAN_DATA_MAX = 8
+SUSPEND_MAX_MS = 0xFFFF
+PARAMETER_HELP = "Number or name, such as 7 or descriptor; 'get TARGET' shows all."
+SIZES = {"u8": 1, "u16": 2, "u32": 4}
+
+TargetArgument = Annotated[str, typer.Argument(metavar="TARGET", help=targets.TARGET_HELP)]
+DevicesArgument = Annotated[
+    list[str] | None, typer.Argument(metavar="[DEVICE]", help=f"{targets.DEVICE_HELP} Without: all.")
+]
+
+
+def register(app: typer.Typer) -> None:
+    app.command(epilog=targets.EPILOG)(get)
+    app.command(name="set", epilog=targets.EPILOG)(set_)
+    app.command(epilog=targets.EPILOG)(suspend)
+    app.command(epilog=targets.EPILOG)(release)
+    app.command(epilog=targets.EPILOG)(reset)
+    app.command(epilog=targets.EPILOG)(passthrough)
+
+
+# --- parameters ---
+
+
+def _kind(client: Client, target: ChannelId) -> Kind:
+    """What a target is; a channel is asked itself."""
+    if target.index == 0:
+        return Kind.DEVICE
+    value = client.get_parameter(target, TRANSFER_TYPE)
+    return Kind.OUTPUT if value[:1] == b"\x02" else Kind.INPUT
+
+
+def _find(kind: Kind, text: str) -> Parameter | int:
+    try:
+        return find(kind, text)
+    except ValueError as error:
+        raise UsageFault(str(error)) from None
+
+
+def _number(parameter: Parameter | int) -> int:
+    return parameter if isinstance(parameter, int) else parameter.number
+
+
+def _value_json(parameter: Parameter | int, value: bytes) -> Json:
+    if isinstance(parameter, int):
+        return {"parameter": parameter, "name": None, "value": None, "text": value.hex(" "), "raw": value.hex()}
+    return parameter_json(parameter, value)
+
+
+def get(
+    ctx: typer.Context,
+    target: TargetArgument,
+    parameter: Annotated[
+        str | None, typer.Argument(metavar="[PARAMETER]", help=f"{PARAMETER_HELP} Without: all.")
+    ] = None,
+    raw: Annotated[bool, typer.Option("--raw", help="The bytes in hexadecimal.")] = False,
+    as_json: JsonOption = False,
+) -> None:
+    """Read a parameter of a device or channel, or all."""
+    with connect(ctx) as client:
+        found = targets.any_target(client, target)
+        kind = _kind(client, found)
+        head: Json = {"id": str(found), "kind": str(kind)}
+        if parameter is None:
+            with waiting("reading parameters", len(PARAMETERS[kind])) as step:
+                read = read_parameters(client, found, kind, step)
+            show(ctx, as_json, head | {"parameters": parameters_json(read)}, parameter_grid(read, 0))
+            return
+        chosen = _find(kind, parameter)
+        with waiting("reading"):
+            value = client.get_parameter(found, _number(chosen))
+    data = head | _value_json(chosen, value)
+    show(ctx, as_json, data, Text(value.hex(" ") if raw else str(data["text"])))
+
+
+def _bytes(word: str) -> bytes | None:
+    """A value with a prefix that says how it is written; None: it has none."""
+    prefix, colon, rest = word.partition(":")
+    if not colon:
+        return None
+    try:
+        if prefix == "hex":
+            return bytes.fromhex(rest)
+        if prefix == "text":
+            return rest.encode()
+        if prefix in SIZES:
+            return parse_number(rest).to_bytes(SIZES[prefix], "little")
+    except (ValueError, OverflowError) as error:
+        reason = f"does not fit {prefix}" if isinstance(error, OverflowError) else f"is wrong: {error}"
+        raise UsageFault(f"'{word}' {reason}") from None
+    return None
+
+
+def parse_value(parameter: Parameter | int, words: list[str]) -> bytes:
+    """What a user wrote, as bytes. Raises UsageFault."""
+    value = _bytes(words[0]) if len(words) == 1 else None
+    if value is None:
+        if isinstance(parameter, int):
+            raise UsageFault(
+                f"how parameter {parameter} is laid out is not known: write its value as hex:..., text:..., u8:N, "
+                "u16:N or u32:N"
+            )
+        try:
+            value = parameter.parse(words)
+        except ValueError as error:
+            raise UsageFault(f"{parameter.name}: {error}") from None
+    if not value:
+        raise UsageFault("a value must have one byte at least")
+    return value
+
+
+def set_(
+    ctx: typer.Context,
+    target: TargetArgument,
+    parameter: Annotated[str, typer.Argument(metavar="PARAMETER", help=PARAMETER_HELP)],
+    value: Annotated[
+        list[str],
+        typer.Argument(
+            metavar="VALUE",
+            help="As 'get' prints it: a number for each field, on or off, text, channels (2,3). For any parameter: "
+            "hex:01F4, text:..., u8:N, u16:N, u32:N.",
+        ),
+    ],
+) -> None:
+    """Write a parameter of a device or channel."""
+    with connect(ctx) as client:
+        found = targets.any_target(client, target)
+        # A channel is asked what it is only where that matters.
+        by_number = parameter.isdecimal() and len(value) == 1 and _bytes(value[0]) is not None
+        chosen = _find(Kind.DEVICE if by_number else _kind(client, found), parameter)
+        data = parse_value(chosen, value)
+        with waiting("writing"):
+            client.set_parameter(found, _number(chosen), data)
+
+
+# --- commands to devices ---
+
+
+def _each(client: Client, names: list[str] | None) -> list[Identity | None]:
+    """The devices named; None for all."""
+    return [targets.device(client, name) for name in names] if names else [None]
+
+
+def suspend(
+    ctx: typer.Context,
+    device: DevicesArgument = None,
+    ms: Annotated[
+        int, typer.Option("--ms", min=0, max=SUSPEND_MAX_MS, help="For so long; 0: until they are released.")
+    ] = 0,
+) -> None:
+    """Make devices stop sending channel data."""
+    with connect(ctx) as client:
+        for identity in _each(client, device):
+            client.suspend(identity, ms)
+
+
+def release(ctx: typer.Context, device: DevicesArgument = None) -> None:
+    """Let suspended devices send again."""
+    with connect(ctx) as client:
+        for identity in _each(client, device):
+            client.release(identity)
+
+
+def reset(ctx: typer.Context, device: DevicesArgument = None) -> None:
+    """Reset devices. They bind again and get their links back."""
+    with connect(ctx) as client, waiting("resetting"):
+        for identity in _each(client, device):
+            client.reset(identity)
+
+
+def passthrough(
+    ctx: typer.Context,
+    device: Annotated[str, typer.Argument(metavar="DEVICE", help=f"{targets.DEVICE_HELP} 'all' broadcasts.")],
+    data: Annotated[list[str], typer.Argument(metavar="BYTES", help="1 to 8 bytes in hexadecimal: 03 07 00.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Send a frame to a device and show the data of its answer."""
+    try:
+        frame = bytes.fromhex("".join(word.rjust(2, "0") if len(word) == 1 else word for word in data))
+    except ValueError:
+        raise UsageFault(f"'{' '.join(data)}' are no bytes in hexadecimal") from None
+    if not 1 <= len(frame) <= CAN_DATA_MAX:
+        raise UsageFault(f"a frame has 1 to {CAN_DATA_MAX} bytes, not {len(frame)}")
+    with connect(ctx) as client:
+        identity = BROADCAST if device == "all" else targets.device(client, device)
+        answer = client.passthrough(identity, frame)
+    text = answer.hex(" ").upper()
+    show(ctx, as_json, {"id": str(identity), "sent": frame.hex(), "answer": answer.hex()}, Text(text))

@@ -1,0 +1,176 @@
+"""Commands that change links, configurations and what the profile layer does by itself."""
+
+from collections.abc import Callable
+from enum import StrEnum
+from typing import Annotated
+
+import typer
+from rich.text import Text
+
+from ..client import Client
+from ..model import Action, Flags
+from . import targets
+from .common import Json, JsonOption, connect, show, waiting
+from .tables import STATUS_STYLES
+
+NumberArgument = Annotated[int, typer.Argument(metavar="N", min=1, max=255, help="Number of the configuration.")]
+
+
+class Switch(StrEnum):
+    ON = "on"
+    OFF = "off"
+
+
+class SwitchOrNow(StrEnum):
+    ON = "on"
+    OFF = "off"
+    NOW = "now"
+
+
+class FlagName(StrEnum):
+    """Flags that can be switched."""
+
+    AUTOCONFIGURE = "autoconfigure"
+    HOT_SWAP = "hot-swap"
+    AUTO_SAVE = "auto-save"
+    STRICT_CRC = "strict-crc"
+
+
+def register(app: typer.Typer) -> None:
+    app.command(epilog=targets.EPILOG)(link)
+    app.command(epilog=targets.EPILOG)(unlink)
+    app.command()(clear)
+    app.command()(enforce)
+    app.command()(autoconfig)
+    app.command()(replace)
+    app.command()(adopt)
+    app.command()(save)
+    app.command()(load)
+    app.command()(erase)
+    app.command()(flag)
+
+
+def link(
+    ctx: typer.Context,
+    output: Annotated[str, typer.Argument(metavar="OUTPUT", help=targets.OUTPUT_HELP)],
+    input_: Annotated[str, typer.Argument(metavar="INPUT", help=targets.INPUT_HELP)],
+    as_json: JsonOption = False,
+) -> None:
+    """Link an output to an input, whose source it replaces."""
+    with connect(ctx) as client, waiting("linking"):
+        source, target = targets.output(client, output), targets.input_(client, input_)
+        status = client.link(source, target)
+    name = status.name.lower()
+    text = Text.assemble(f"{source} → {target}: ", (name, STATUS_STYLES[status]))
+    show(ctx, as_json, {"output": str(source), "input": str(target), "status": name}, text)
+
+
+def unlink(
+    ctx: typer.Context,
+    input_: Annotated[str, typer.Argument(metavar="INPUT", help=targets.INPUT_HELP)],
+) -> None:
+    """Remove the link of an input."""
+    with connect(ctx) as client, waiting("unlinking"):
+        client.unlink(targets.input_(client, input_))
+
+
+def _act(ctx: typer.Context, as_json: bool, what: Action, done: str, argument: int = 0) -> None:
+    """One action of the profile layer, and how many links it made or removed."""
+    with connect(ctx) as client, waiting("working"):
+        count = client.action(what, argument)
+    show(ctx, as_json, {"links": count}, f"{count} {'link' if count == 1 else 'links'} {done}")
+
+
+def clear(ctx: typer.Context, as_json: JsonOption = False) -> None:
+    """Remove all links."""
+    _act(ctx, as_json, Action.CLEAR, "removed")
+
+
+def enforce(ctx: typer.Context, as_json: JsonOption = False) -> None:
+    """Remove links that break sole access."""
+    _act(ctx, as_json, Action.ENFORCE, "removed")
+
+
+def replace(ctx: typer.Context, as_json: JsonOption = False) -> None:
+    """Find stand-ins for missing channels of the active configuration."""
+    _act(ctx, as_json, Action.REPLACE, "made")
+
+
+def adopt(ctx: typer.Context, as_json: JsonOption = False) -> None:
+    """Make the stand-ins part of the active configuration."""
+    _act(ctx, as_json, Action.ADOPT, "adopted")
+
+
+def autoconfig(
+    ctx: typer.Context,
+    what: Annotated[SwitchOrNow, typer.Argument(help="on, off: by itself, or not; now: once.")],
+    as_json: JsonOption = False,
+) -> None:
+    """Connect terminal channels that have no link: now, or by itself from now on."""
+    if what is SwitchOrNow.NOW:
+        _act(ctx, as_json, Action.AUTOCONFIGURE, "made")
+    else:
+        _switch(ctx, as_json, FlagName.AUTOCONFIGURE, what is SwitchOrNow.ON)
+
+
+def flag(
+    ctx: typer.Context,
+    name: Annotated[FlagName, typer.Argument(help="Which; 'pdcp info' shows all.")],
+    value: Annotated[Switch, typer.Argument()],
+    as_json: JsonOption = False,
+) -> None:
+    """Switch a setting of the arbitrator on or off. It is stored."""
+    _switch(ctx, as_json, name, value is Switch.ON)
+
+
+def _switch(ctx: typer.Context, as_json: bool, name: FlagName, on: bool) -> None:
+    bit = Flags[name.name]
+    with connect(ctx) as client:
+        client.change_flags(on=bit) if on else client.change_flags(off=bit)
+    show(ctx, as_json, {"flag": str(name), "on": on}, f"{name} {'on' if on else 'off'}")
+
+
+def _with_active(ctx: typer.Context, as_json: bool, act: Callable[[Client], str]) -> None:
+    """An action on configurations; tells which is active afterwards and how many are stored."""
+    with connect(ctx) as client, waiting("working"):
+        done = act(client)
+        info = client.info()
+    active = f"configuration {info.active} is active" if info.active else "none is active"
+    data: Json = {"active_configuration": info.active, "stored_configurations": info.stored}
+    show(ctx, as_json, data, f"{done}; {active}, {info.stored} stored")
+
+
+def save(
+    ctx: typer.Context,
+    number: Annotated[
+        int, typer.Argument(metavar="[N]", min=0, max=255, help="Number of the configuration; 0: the active one.")
+    ] = 0,
+    as_json: JsonOption = False,
+) -> None:
+    """Store the links as a configuration."""
+
+    def act(client: Client) -> str:
+        client.action(Action.SAVE, number)
+        return "saved"
+
+    _with_active(ctx, as_json, act)
+
+
+def load(ctx: typer.Context, number: NumberArgument, as_json: JsonOption = False) -> None:
+    """Make the links of a stored configuration, and remove all others."""
+
+    def act(client: Client) -> str:
+        count = client.action(Action.LOAD, number)
+        return f"loaded, {count} {'link' if count == 1 else 'links'} changed"
+
+    _with_active(ctx, as_json, act)
+
+
+def erase(ctx: typer.Context, number: NumberArgument, as_json: JsonOption = False) -> None:
+    """Forget a stored configuration. Its links stay as they are."""
+
+    def act(client: Client) -> str:
+        client.action(Action.ERASE, number)
+        return "erased"
+
+    _with_active(ctx, as_json, act)

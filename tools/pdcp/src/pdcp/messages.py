@@ -1,0 +1,515 @@
+"""The messages of the host API [API 3.2, 3.3], and the extension group 24xxh (D-API-5).
+
+Each message is a dataclass whose fields are its payload, in the order of the wire; all are packed and unpacked by the
+same few lines. The success answer of request n is n + 1, its failure answer n + 2.
+"""
+
+import struct
+from dataclasses import dataclass, fields
+from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast, get_args, get_type_hints
+
+from .model import ChannelId, Identity
+from .wire import Frame
+
+
+class FormatError(ValueError):
+    """A payload, or a value for one, that does not fit its message."""
+
+
+# --- fields ---
+
+
+# How fields stand in a payload. take() returns the value at the front and how many bytes it has; it raises IndexError
+# when there are too few.
+
+
+@dataclass(frozen=True)
+class _Unsigned:
+    """A number, LSB first."""
+
+    size: int
+
+    def pack(self, value: int) -> bytes:
+        try:
+            return value.to_bytes(self.size, "little")
+        except OverflowError:
+            raise FormatError(f"{value} does not fit {8 * self.size} bits") from None
+
+    def take(self, data: bytes) -> tuple[int, int]:
+        if len(data) < self.size:
+            raise IndexError
+        return int.from_bytes(data[: self.size], "little"), self.size
+
+
+class _Device:
+    """VID, PID, SN."""
+
+    _layout = struct.Struct("<HHH")
+
+    def pack(self, value: Identity) -> bytes:
+        try:
+            return self._layout.pack(value.vid, value.pid, value.sn)
+        except struct.error:
+            raise FormatError(f"{value} does not fit three times 16 bits") from None
+
+    def take(self, data: bytes) -> tuple[Identity, int]:
+        if len(data) < self._layout.size:
+            raise IndexError
+        return Identity(*self._layout.unpack_from(data)), self._layout.size
+
+
+class _ChannelOfDevice:
+    """VID, PID, SN, channel index."""
+
+    def pack(self, value: ChannelId) -> bytes:
+        return _Device().pack(value.identity) + _Unsigned(1).pack(value.index)
+
+    def take(self, data: bytes) -> tuple[ChannelId, int]:
+        identity, size = _Device().take(data)
+        return ChannelId(identity, data[size]), size + 1
+
+
+@dataclass(frozen=True)
+class _Bytes:
+    """So many bytes; without a size all that are left, at least so many."""
+
+    size: int | None = None
+    least: int = 0
+
+    def pack(self, value: bytes) -> bytes:
+        if len(value) < self.least or (self.size is not None and len(value) != self.size):
+            raise FormatError(f"{len(value)} bytes are not {self.size or f'{self.least} or more'}")
+        return value
+
+    def take(self, data: bytes) -> tuple[bytes, int]:
+        size = len(data) if self.size is None else self.size
+        if len(data) < max(size, self.least):
+            raise IndexError
+        return data[:size], size
+
+
+class _Counters:
+    """32-bit numbers to the end."""
+
+    def pack(self, value: tuple[int, ...]) -> bytes:
+        return b"".join(_Unsigned(4).pack(each) for each in value)
+
+    def take(self, data: bytes) -> tuple[tuple[int, ...], int]:
+        if len(data) % 4:
+            raise IndexError
+        return struct.unpack(f"<{len(data) // 4}I", data), len(data)
+
+
+_Codec = _Unsigned | _Device | _ChannelOfDevice | _Bytes | _Counters
+
+U8 = Annotated[int, _Unsigned(1)]
+U16 = Annotated[int, _Unsigned(2)]
+U32 = Annotated[int, _Unsigned(4)]
+Dev = Annotated[Identity, _Device()]
+Chan = Annotated[ChannelId, _ChannelOfDevice()]
+Octets = Annotated[bytes, _Bytes(8)]
+Rest = Annotated[bytes, _Bytes()]
+Value = Annotated[bytes, _Bytes(least=1)]
+U32s = Annotated[tuple[int, ...], _Counters()]
+
+# --- kinds of messages ---
+
+MESSAGES: dict[int, type["Message"]] = {}  # by id
+
+AnswerT = TypeVar("AnswerT", bound="Message", covariant=True)
+
+
+class Message:
+    """A message without its header."""
+
+    ID: ClassVar[int]
+
+    def __init_subclass__(cls, id: int | None = None) -> None:
+        super().__init_subclass__()
+        if id is not None:
+            assert id not in MESSAGES, f"{id:04X}h twice"
+            cls.ID = id
+            MESSAGES[id] = cls
+
+    def pack(self) -> bytes:
+        """The payload. Raises FormatError when a value does not fit its field."""
+        parts = []
+        for name, codec in _layout(type(self)):
+            try:
+                parts.append(codec.pack(getattr(self, name)))
+            except FormatError as error:
+                raise FormatError(f"{type(self).__name__}, {name}: {error}") from None
+        return b"".join(parts)
+
+    @classmethod
+    def unpack(cls, payload: bytes) -> Self:
+        """Reads a payload. Raises FormatError when its size is wrong."""
+        values: dict[str, Any] = {}
+        at = 0
+        try:
+            for name, codec in _layout(cls):
+                values[name], size = codec.take(payload[at:])
+                at += size
+        except IndexError:
+            at = -1
+        if at != len(payload):
+            raise FormatError(f"{cls.ID:04X}h cannot have {len(payload)} bytes: {payload.hex(' ') or 'none'}")
+        return cls(**values)
+
+
+_layouts: dict[type[Message], list[tuple[str, _Codec]]] = {}
+
+
+def _layout(kind: type[Message]) -> list[tuple[str, _Codec]]:
+    """Names of the fields of a class, and how they stand in its payload."""
+    if kind not in _layouts:
+        hints = get_type_hints(kind, include_extras=True)
+        _layouts[kind] = [(each.name, get_args(hints[each.name])[1]) for each in fields(cast(Any, kind))]
+    return _layouts[kind]
+
+
+class Request(Message, Generic[AnswerT]):
+    """A message from the host. READS: it changes nothing, so that it may be sent again."""
+
+    READS: ClassVar[bool] = False
+
+    def __init_subclass__(cls, id: int | None = None, reads: bool = False) -> None:
+        super().__init_subclass__(id)
+        cls.READS = reads
+
+    @classmethod
+    def success(cls) -> type[AnswerT]:
+        """The class of its success answer."""
+        return cast(type[AnswerT], MESSAGES[cls.ID + 1])
+
+    @classmethod
+    def failure(cls) -> type[Message]:
+        return MESSAGES[cls.ID + 2]
+
+
+@dataclass(frozen=True)
+class Failure(Message):
+    """A failure answer with an error code (D-API-4)."""
+
+    error: U8
+
+
+def unpack(frame: Frame) -> Message:
+    """The message in a frame. Raises FormatError when there is no such message, or its size is wrong."""
+    try:
+        kind = MESSAGES[frame.message]
+    except KeyError:
+        raise FormatError(f"there is no message {frame.message:04X}h") from None
+    return kind.unpack(frame.payload)
+
+
+# --- 22xxh: the tables ---
+
+
+@dataclass(frozen=True)
+class UnknownId(Message, id=0x2200):
+    pass
+
+
+@dataclass(frozen=True)
+class GetSystemInfo(Request["SystemInfoSuccess"], id=0x2201, reads=True):
+    pass
+
+
+@dataclass(frozen=True)
+class SystemInfoSuccess(Message, id=0x2202):
+    devices: U8
+    inputs: U8
+    outputs: U8
+    links: U8
+
+
+class SystemInfoFailure(Failure, id=0x2203):
+    pass
+
+
+@dataclass(frozen=True)
+class GetDeviceInfo(Request["DeviceInfoSuccess"], id=0x2204, reads=True):
+    number: U8
+
+
+@dataclass(frozen=True)
+class DeviceInfoSuccess(Message, id=0x2205):
+    channel: Chan
+    type: U16
+    profile: U16
+
+
+class DeviceInfoFailure(Failure, id=0x2206):
+    pass
+
+
+@dataclass(frozen=True)
+class GetInputInfo(Request["InputInfoSuccess"], id=0x2207, reads=True):
+    number: U8
+
+
+@dataclass(frozen=True)
+class InputInfoSuccess(Message, id=0x2208):
+    channel: Chan
+    type: U16
+    profile: U16
+
+
+class InputInfoFailure(Failure, id=0x2209):
+    pass
+
+
+@dataclass(frozen=True)
+class GetOutputInfo(Request["OutputInfoSuccess"], id=0x220A, reads=True):
+    number: U8
+
+
+@dataclass(frozen=True)
+class OutputInfoSuccess(Message, id=0x220B):
+    channel: Chan
+    type: U16
+    profile: U16
+
+
+class OutputInfoFailure(Failure, id=0x220C):
+    pass
+
+
+@dataclass(frozen=True)
+class GetLinkInfo(Request["LinkInfoSuccess"], id=0x220D, reads=True):
+    number: U8
+
+
+@dataclass(frozen=True)
+class LinkInfoSuccess(Message, id=0x220E):
+    output: Chan
+    input: Chan
+    status: U8
+
+
+class LinkInfoFailure(Failure, id=0x220F):
+    pass
+
+
+# --- 23xxh: the devices ---
+
+
+@dataclass(frozen=True)
+class GetParameter(Request["GetParameterSuccess"], id=0x2301, reads=True):
+    channel: Chan
+    parameter: U8
+
+
+@dataclass(frozen=True)
+class GetParameterSuccess(Message, id=0x2302):
+    value: Rest
+
+
+class GetParameterFailure(Failure, id=0x2303):
+    pass
+
+
+@dataclass(frozen=True)
+class SetParameter(Request["SetParameterSuccess"], id=0x2304):
+    channel: Chan
+    parameter: U8
+    value: Value
+
+
+@dataclass(frozen=True)
+class SetParameterSuccess(Message, id=0x2305):
+    pass
+
+
+class SetParameterFailure(Failure, id=0x2306):
+    pass
+
+
+@dataclass(frozen=True)
+class ConfigureLink(Request["ConfigureLinkSuccess"], id=0x2307):
+    output: Chan
+    input: Chan
+
+
+@dataclass(frozen=True)
+class ConfigureLinkSuccess(Message, id=0x2308):
+    status: U8
+
+
+class ConfigureLinkFailure(Failure, id=0x2309):
+    pass
+
+
+@dataclass(frozen=True)
+class Passthrough(Request["PassthroughSuccess"], id=0x230A):
+    device: Dev
+    dlc: U8
+    data: Octets
+
+
+@dataclass(frozen=True)
+class PassthroughSuccess(Message, id=0x230B):
+    device: Dev
+    dlc: U8
+    data: Octets
+
+
+class PassthroughFailure(Failure, id=0x230C):
+    pass
+
+
+@dataclass(frozen=True)
+class Reset(Request["ResetSuccess"], id=0x230D):
+    number: U8
+
+
+@dataclass(frozen=True)
+class ResetSuccess(Message, id=0x230E):
+    pass
+
+
+@dataclass(frozen=True)
+class ResetFailure(Message, id=0x230F):
+    """Bit 0 of the first byte is device 1; cleared: not reset."""
+
+    results: Octets
+
+
+# --- 24xxh: the arbitrator ---
+
+
+@dataclass(frozen=True)
+class GetArbitratorInfo(Request["ArbitratorInfoSuccess"], id=0x2401, reads=True):
+    pass
+
+
+@dataclass(frozen=True)
+class ArbitratorInfoSuccess(Message, id=0x2402):
+    protocol: U8
+    firmware_major: U8
+    firmware_minor: U8
+    firmware_patch: U8
+    devices_max: U8
+    channels_max: U8
+    links_max: U8
+    profile_state: U8
+    active: U8
+    stored: U8
+    flags: U8
+
+
+class ArbitratorInfoFailure(Failure, id=0x2403):
+    pass
+
+
+@dataclass(frozen=True)
+class SetFlags(Request["SetFlagsSuccess"], id=0x2404):
+    flags: U8
+
+
+@dataclass(frozen=True)
+class SetFlagsSuccess(Message, id=0x2405):
+    pass
+
+
+class SetFlagsFailure(Failure, id=0x2406):
+    pass
+
+
+@dataclass(frozen=True)
+class ProfileAction(Request["ProfileActionSuccess"], id=0x2407):
+    action: U8
+    argument: U8
+
+
+@dataclass(frozen=True)
+class ProfileActionSuccess(Message, id=0x2408):
+    result: U16
+
+
+class ProfileActionFailure(Failure, id=0x2409):
+    pass
+
+
+@dataclass(frozen=True)
+class ReadConfigurations(Request["ReadConfigurationsSuccess"], id=0x240A, reads=True):
+    offset: U16
+    length: U8
+
+
+@dataclass(frozen=True)
+class ReadConfigurationsSuccess(Message, id=0x240B):
+    total: U16
+    offset: U16
+    data: Rest
+
+
+class ReadConfigurationsFailure(Failure, id=0x240C):
+    pass
+
+
+@dataclass(frozen=True)
+class WriteConfigurations(Request["WriteConfigurationsSuccess"], id=0x240D):
+    offset: U16
+    total: U16
+    data: Rest
+
+
+@dataclass(frozen=True)
+class WriteConfigurationsSuccess(Message, id=0x240E):
+    pass
+
+
+class WriteConfigurationsFailure(Failure, id=0x240F):
+    pass
+
+
+@dataclass(frozen=True)
+class RemoveLink(Request["RemoveLinkSuccess"], id=0x2410):
+    input: Chan
+
+
+@dataclass(frozen=True)
+class RemoveLinkSuccess(Message, id=0x2411):
+    pass
+
+
+class RemoveLinkFailure(Failure, id=0x2412):
+    pass
+
+
+@dataclass(frozen=True)
+class GetStatistics(Request["StatisticsSuccess"], id=0x2413, reads=True):
+    group: U8
+
+
+@dataclass(frozen=True)
+class StatisticsSuccess(Message, id=0x2414):
+    group: U8
+    counters: U32s
+
+
+class StatisticsFailure(Failure, id=0x2415):
+    pass
+
+
+@dataclass(frozen=True)
+class StreamEvents(Request["StreamEventsSuccess"], id=0x2416):
+    mask: U8
+
+
+@dataclass(frozen=True)
+class StreamEventsSuccess(Message, id=0x2417):
+    pass
+
+
+class StreamEventsFailure(Failure, id=0x2418):
+    pass
+
+
+@dataclass(frozen=True)
+class EventMessage(Message, id=0x2419):
+    kind: U8
+    time_ms: U32
+    data: Rest

@@ -1,0 +1,258 @@
+"""Parameters of devices and channels (pdcp-bus.md 4; [PROFILE tables 2.8, 2.9 and 2.10]): names, units, layouts, and
+their values as text."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+
+from .model import Direction, parse_number
+from .profiles import describe_type, parse_profile, profile_name
+
+BITS_MAX = 32 * 8  # channels that a required or desired string can name (D-BUS-8)
+
+# Values of an input's parameters 5 to 8 when it is not connected (D-BUS-7).
+_NO_SOURCE = {5: [0xFFFF, 0xFFFF], 6: [0xFFFF, 0xFF], 7: [0, 0], 8: [0, 0]}
+
+
+class Kind(StrEnum):
+    """What has parameters."""
+
+    DEVICE = "device"
+    INPUT = "input"
+    OUTPUT = "output"
+
+
+class Style(StrEnum):
+    """How a field is shown and read."""
+
+    NUMBER = "number"
+    WORD = "word"  # in hexadecimal
+    TYPE = "type"  # of a channel
+    PROFILE = "profile"
+    SWITCH = "switch"
+    DIRECTION = "direction"  # transfer type
+
+
+class Form(StrEnum):
+    """How a whole value is laid out."""
+
+    FIELDS = "fields"
+    TEXT = "text"  # UTF-8 without a terminator
+    CHANNELS = "channels"  # bit string; most significant bit of the first byte: channel 0 (D-BUS-8)
+
+
+FieldValue = int | str | bool
+Decoded = dict[str, FieldValue] | str | list[int]
+
+
+@dataclass(frozen=True)
+class Field:
+    """Part of a value, LSB first."""
+
+    name: str
+    size: int  # bytes
+    style: Style = Style.NUMBER
+
+    @property
+    def label(self) -> str:
+        return self.name.replace("_", " ")
+
+    def decode(self, number: int) -> FieldValue:
+        if self.style is Style.SWITCH:
+            return bool(number)
+        if self.style is Style.DIRECTION:
+            return {1: "input", 2: "output"}.get(number, number)
+        return number
+
+    def show(self, number: int) -> str:
+        match self.style:
+            case Style.WORD:
+                return f"{number:04X}h"
+            case Style.TYPE:
+                return f"{describe_type(number)} ({number:04X}h)"
+            case Style.PROFILE:
+                return show_profile(number)
+            case Style.SWITCH:
+                return {0: "off", 1: "on"}.get(number, str(number))
+            case Style.DIRECTION:
+                return {1: "input", 2: "output"}.get(number, str(number))
+            case _:
+                return str(number)
+
+    def parse(self, text: str) -> bytes:
+        words = {"on": 1, "off": 0} if self.style is Style.SWITCH else {}
+        words |= {"input": 1, "output": 2} if self.style is Style.DIRECTION else {}
+        if text.lower() in words:
+            number = words[text.lower()]
+        elif self.style is Style.PROFILE and not text.isdecimal() and not text.lower().startswith("0x"):
+            number = parse_profile(text)
+        elif self.style in (Style.WORD, Style.TYPE) and text[-1:] in ("h", "H"):
+            number = parse_number(f"0x{text[:-1]}")
+        else:
+            number = parse_number(text)
+        if not 0 <= number < 1 << 8 * self.size:
+            raise ValueError(f"{number} is not between 0 and {(1 << 8 * self.size) - 1}")
+        return number.to_bytes(self.size, "little")
+
+
+_VENDOR = (Field("vid", 2), Field("pid", 2))
+_CHANNEL_TYPE = (Field("type", 2, Style.TYPE), Field("profile", 2, Style.PROFILE))
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter of a kind of things."""
+
+    kind: Kind
+    number: int
+    name: str
+    fields: tuple[Field, ...] = ()
+    form: Form = Form.FIELDS
+    unit: str = ""
+
+    @property
+    def size(self) -> int | None:
+        """Bytes of a value; None: as long as it is."""
+        return sum(field.size for field in self.fields) if self.form is Form.FIELDS else None
+
+    def _numbers(self, value: bytes) -> list[int]:
+        # Missing bytes are 0, extra ones are ignored.
+        numbers = []
+        for field in self.fields:
+            numbers.append(int.from_bytes(value[: field.size], "little"))
+            value = value[field.size :]
+        return numbers
+
+    def decode(self, value: bytes) -> Decoded:
+        """A value as plain data, for JSON: fields by name, a text, or a list of channels."""
+        if self.form is Form.TEXT:
+            return value.decode(errors="replace")
+        if self.form is Form.CHANNELS:
+            return channels_of(value)
+        numbers = self._numbers(value)
+        return {field.name: field.decode(number) for field, number in zip(self.fields, numbers, strict=True)}
+
+    def show(self, value: bytes) -> str:
+        """A value as people read it: one line, without control characters."""
+        if self.form is Form.TEXT:
+            return "".join(each if each.isprintable() else "\ufffd" for each in value.decode(errors="replace"))
+        if self.form is Form.CHANNELS:
+            return ", ".join(str(each) for each in channels_of(value)) or "none"
+        numbers = self._numbers(value)
+        if self.kind is Kind.INPUT and _NO_SOURCE.get(self.number) == numbers:
+            return "none"
+        shown = [field.show(number) for field, number in zip(self.fields, numbers, strict=True)]
+        if len(shown) == 1:
+            return f"{shown[0]} {self.unit}".rstrip()
+        if self.fields == _CHANNEL_TYPE:
+            return "; ".join(shown)
+        return ", ".join(f"{field.label} {text}" for field, text in zip(self.fields, shown, strict=True))
+
+    def parse(self, words: Sequence[str]) -> bytes:
+        """A value from what a user wrote: one word for each field, a text, or channels. Raises ValueError."""
+        if self.form is Form.TEXT:
+            return " ".join(words).encode()
+        if self.form is Form.CHANNELS:
+            names = [] if list(words) == ["none"] else [part for word in words for part in word.split(",") if part]
+            return bits_of([parse_number(name) for name in names])
+        if len(words) != len(self.fields):
+            wanted = ", ".join(field.name for field in self.fields)
+            raise ValueError(f"{self.name} takes {len(self.fields)} values ({wanted}), not {len(words)}")
+        return b"".join(field.parse(word) for field, word in zip(self.fields, words, strict=True))
+
+
+def show_profile(word: int) -> str:
+    """A profile with its name, as far as it has one."""
+    name = profile_name(word)
+    return f"{name} ({word:04X}h)" if name and not name.endswith("h") else name or f"{word:04X}h"
+
+
+def channels_of(bits: bytes) -> list[int]:
+    """The channels whose bit is set."""
+    return [8 * at + bit for at, byte in enumerate(bits) for bit in range(8) if byte & 0x80 >> bit]
+
+
+def bits_of(channels: Sequence[int]) -> bytes:
+    """The shortest string with these bits set, one byte at least."""
+    bits = bytearray(max(channels, default=0) // 8 + 1)
+    for channel in channels:
+        if not 0 <= channel < BITS_MAX:
+            raise ValueError(f"channel {channel} is not between 0 and {BITS_MAX - 1}")
+        bits[channel // 8] |= 0x80 >> channel % 8
+    return bytes(bits)
+
+
+def _one(name: str, size: int, style: Style = Style.NUMBER) -> tuple[Field, ...]:
+    return (Field(name, size, style),)
+
+
+DEVICE_PARAMETERS = (
+    Parameter(Kind.DEVICE, 1, "vid-pid", _VENDOR),
+    Parameter(Kind.DEVICE, 2, "serial-number", _one("sn", 2)),
+    Parameter(Kind.DEVICE, 3, "ean13-low", _one("ean13_low", 4)),
+    Parameter(Kind.DEVICE, 4, "ean13-high", _one("ean13_high", 4)),
+    Parameter(Kind.DEVICE, 5, "version", (Field("firmware", 2), Field("hardware", 2))),
+    Parameter(Kind.DEVICE, 6, "type", (Field("type", 2, Style.WORD), Field("profile", 2, Style.WORD))),
+    Parameter(Kind.DEVICE, 7, "descriptor", form=Form.TEXT),
+    Parameter(Kind.DEVICE, 8, "node-id", _one("node_id", 1)),
+    Parameter(Kind.DEVICE, 9, "channels", _one("channels", 1)),
+    Parameter(Kind.DEVICE, 10, "beacon-interval", _one("beacon_interval", 2), unit="ms"),
+    Parameter(Kind.DEVICE, 11, "ack-time", _one("ack_time", 2), unit="ms"),
+    Parameter(Kind.DEVICE, 12, "bind-timeout", _one("bind_timeout", 2), unit="ms"),
+)
+
+
+def _of_channel(kind: Kind) -> tuple[Parameter, ...]:
+    return (
+        Parameter(kind, 1, "type", _CHANNEL_TYPE),
+        Parameter(kind, 2, "descriptor", form=Form.TEXT),
+        Parameter(kind, 3, "transfer-type", _one("transfer_type", 1, Style.DIRECTION)),
+        Parameter(kind, 4, "enabled", _one("enabled", 1, Style.SWITCH)),
+    )
+
+
+def _needs(kind: Kind) -> tuple[Parameter, ...]:
+    return (
+        Parameter(kind, 9, "required", form=Form.CHANNELS),
+        Parameter(kind, 10, "desired", form=Form.CHANNELS),
+    )
+
+
+INPUT_PARAMETERS = (
+    *_of_channel(Kind.INPUT),
+    Parameter(Kind.INPUT, 5, "source-device", _VENDOR),
+    Parameter(Kind.INPUT, 6, "source-channel", (Field("sn", 2), Field("index", 1))),
+    Parameter(Kind.INPUT, 7, "source-nodes", (Field("device_node", 1), Field("output_node", 1))),
+    Parameter(Kind.INPUT, 8, "source-type", _CHANNEL_TYPE),
+    *_needs(Kind.INPUT),
+    Parameter(Kind.INPUT, 11, "terminal-profile", _one("terminal_profile", 2, Style.PROFILE)),
+)
+
+OUTPUT_PARAMETERS = (
+    *_of_channel(Kind.OUTPUT),
+    Parameter(Kind.OUTPUT, 5, "node-id", _one("node_id", 1)),
+    *_needs(Kind.OUTPUT),
+)
+
+PARAMETERS = {Kind.DEVICE: DEVICE_PARAMETERS, Kind.INPUT: INPUT_PARAMETERS, Kind.OUTPUT: OUTPUT_PARAMETERS}
+TRANSFER_TYPE = 3  # parameter of a channel that says which kind it is
+
+
+def kind_of(direction: Direction) -> Kind:
+    return Kind.INPUT if direction is Direction.INPUT else Kind.OUTPUT
+
+
+def find(kind: Kind, text: str) -> Parameter | int:
+    """A parameter by its number or name; a number that this kind does not have stays a number. Raises ValueError."""
+    name = text.lower().replace("_", "-")
+    for parameter in PARAMETERS[kind]:
+        if parameter.name == name:
+            return parameter
+    if not text[:1].isdigit():
+        names = ", ".join(parameter.name for parameter in PARAMETERS[kind])
+        article = "a" if kind is Kind.DEVICE else "an"
+        raise ValueError(f"{article} {kind} has no parameter '{text}'; it has {names}")
+    number = parse_number(text)
+    if not 0 <= number <= 0xFF:
+        raise ValueError(f"parameter {number} is not between 0 and 255")
+    return next((each for each in PARAMETERS[kind] if each.number == number), number)

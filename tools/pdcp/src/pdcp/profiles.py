@@ -1,0 +1,116 @@
+"""Channel profiles and types in words (profile-layer.md 1 and 2): the reference tree of docs/profiles.md."""
+
+from __future__ import annotations
+
+import difflib
+import functools
+import re
+import tomllib
+from dataclasses import dataclass
+from importlib import resources
+
+__all__ = ["Profile", "describe_type", "parse_profile", "profile_name", "profile_path", "profiles"]
+
+_HEX_WORD = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})|([0-9A-Fa-f]{4})[hH]?|([0-9A-Fa-f]{1,4})[hH]")
+
+_SIZES = ("4 bits", "8 bits", "12 bits", "16 bits")
+_DATA = ("signed", "unsigned", "float", "boolean")
+_CONTROL = ("position", "velocity", "acceleration", "other")
+_PRESCALERS = ("", "x10^-6", "x10^-3", "x10^-1", "x10", "x10^2", "x10^3", "x10^6")
+_FLOAT = 2
+_BITS_16 = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """A node of the tree. What the file leaves out is that of the parent."""
+
+    word: int
+    path: str
+    name: str
+    means: str
+    scale: str
+    mode: str
+    sign: str
+    rate: str
+    safe: str
+
+
+def _parent(word: int) -> int:
+    """The word without its last component that is not 0; 0 for a root."""
+    for mask in (0xFFF0, 0xFF00, 0xF000):
+        if word & ~mask & 0xFFFF:
+            return word & mask
+    return 0
+
+
+@functools.cache
+def profiles() -> dict[int, Profile]:
+    """All nodes of the tree by their word, lowest first."""
+    text = resources.files("pdcp").joinpath("data/profiles.toml").read_text(encoding="utf-8")
+    rows: dict[str, dict[str, str]] = tomllib.loads(text)
+    tree: dict[int, Profile] = {}
+    for number, row in sorted(rows.items()):
+        word = int(number, 16)
+        inherited = tree.get(_parent(word))
+        values = {
+            key: row.get(key) or (getattr(inherited, key) if inherited else "")
+            for key in ("scale", "mode", "sign", "rate", "safe")
+        }
+        tree[word] = Profile(word, row["path"], row["name"], row["means"], **values)
+    return tree
+
+
+def _named(word: int) -> Profile | None:
+    """The node itself or its nearest ancestor that has a name."""
+    for mask in (0xFFFF, 0xFFF0, 0xFF00, 0xF000):
+        node = profiles().get(word & mask)
+        if node is not None:
+            return node
+    return None
+
+
+def profile_name(word: int) -> str | None:
+    """The name of a profile; for one that has none, its nearest ancestor's, as in `EMG amplitude > 2221h`. None:
+    the null profile, or a root that is not in the tree."""
+    node = _named(word)
+    if node is None:
+        return None
+    return node.name if node.word == word else f"{node.name} > {word:04X}h"
+
+
+def profile_path(word: int) -> str | None:
+    """What parse_profile() takes for this profile, such as `emg.amplitude`; None: it has no name."""
+    node = profiles().get(word)
+    return None if node is None else node.path
+
+
+def parse_profile(text: str) -> int:
+    """The word of a path (`emg.amplitude`) or of a hexadecimal number (`2220`, `2220h`, `0x2220`).
+
+    Raises ValueError with what is close to it."""
+    match = _HEX_WORD.fullmatch(text.strip())
+    if match:
+        return int(match[1] or match[2] or match[3], 16)
+    words = {node.path: node.word for node in profiles().values()}
+    path = re.sub(r"[\s_/-]+", "_", text.strip().lower()).replace("_.", ".").replace("._", ".")
+    if path in words:
+        return words[path]
+    close = difflib.get_close_matches(path, words, n=3, cutoff=0.5)
+    hint = f", perhaps {' or '.join(close)}" if close else ""
+    raise ValueError(f"{text!r} is neither the path of a profile nor a hexadecimal number{hint}")
+
+
+def describe_type(word: int) -> str:
+    """A channel type in words: `8 bits, unsigned, position, sole access, terminal`. What it must not be is marked."""
+    size = word >> 14 & 3
+    data = word >> 12 & 3
+    words = [_SIZES[size], _DATA[data], _CONTROL[word >> 10 & 3]]
+    words += ["sole access"] if word & 0x0200 else []
+    words += ["terminal"] if word & 0x0100 else []
+    words += [_PRESCALERS[word >> 5 & 7]] if word >> 5 & 7 else []
+    if data == _FLOAT and size != _BITS_16:
+        words.append("not allowed: float needs 16 bits")
+    if word & 0x1F:
+        words.append(f"unused bits {word & 0x1F:02X}h")
+    return ", ".join(words)

@@ -31,9 +31,10 @@ typedef struct {
     char *link; /* NULL: none */
 } pty_t;
 
-/* Makes the host's end as a new host expects it: without bytes that the last one left unread, and raw, unless
- * the new host is there already and has its own settings. The end must be open for that, for a moment. */
-static bool make_fresh(pty_t *pty, bool raw)
+/* Makes the host's end as a new host expects it: raw, and without bytes that the last one left unread. Not when
+ * the new host is there already: it has its own settings, and the bytes may be its answers. The end must be open
+ * for that, for a moment. */
+static bool make_fresh(pty_t *pty)
 {
     int host_end = ioctl(pty->fd, TIOCGPTPEER, O_RDWR | O_NOCTTY | O_CLOEXEC);
     if (host_end < 0) {
@@ -41,7 +42,7 @@ static bool make_fresh(pty_t *pty, bool raw)
     }
     struct termios settings;
     bool ok = tcflush(host_end, TCIFLUSH) == 0 && tcgetattr(host_end, &settings) == 0;
-    if (ok && raw) {
+    if (ok) {
         cfmakeraw(&settings);
         ok = tcsetattr(host_end, TCSANOW, &settings) == 0;
     }
@@ -73,7 +74,9 @@ static void on_event(void *ctx, uint32_t events)
     /* Closing the host's end once more is reported too; used keeps that from going round. */
     if ((events & EPOLLHUP) != 0 && pty->used && pty->drained) {
         pty->uart.host_left = true;
-        make_fresh(pty, host_is_gone(pty));
+        if (host_is_gone(pty)) {
+            make_fresh(pty);
+        }
     }
     if (!pty->drained) {
         loop_modify(pty->uart.loop, pty->fd, pty->awaiting_room ? WATCH_ROOM : WATCH_BYTES);
@@ -155,7 +158,7 @@ static bool open_pty(pty_t *pty)
         errno = reason;
         return false;
     }
-    return make_fresh(pty, true);
+    return make_fresh(pty);
 }
 
 /* A stale link goes before the terminal is made: the new one may get the number that the link names. */

@@ -6,6 +6,7 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/epoll.h>
 #include <sys/resource.h>
 #include <sys/stat.h>
 #include <termios.h>
@@ -217,6 +218,42 @@ static void test_answers_that_a_host_left_unread_do_not_reach_the_next(void)
     uart_sends("fresh");
     expect_at_host(host, "fresh");
     close(host);
+}
+
+static int next_host = -1;
+
+/* Comes first of two events in one round: the next host is there and has its answer before the loop tells
+ * that the last one has left. */
+static void on_other(void *ctx, uint32_t events)
+{
+    (void)ctx;
+    (void)events;
+    next_host = open_host();
+    host_sends(next_host, "request");
+    on_ready(NULL);
+    uart_sends("answer");
+}
+
+static void test_the_answer_of_the_next_host_survives_late_news_of_the_last(void)
+{
+    open_uart("pty");
+    int other[2];
+    TEST_ASSERT_EQUAL_INT(0, pipe(other));
+    TEST_ASSERT_TRUE(loop_add(loop, other[0], EPOLLIN | EPOLLET, on_other, NULL));
+    int host = open_host();
+    host_sends(host, "first");
+    expect_from_host("first");
+    settle(1000);
+    TEST_ASSERT_EQUAL_INT(1, write(other[1], "x", 1));
+    close(host);
+    loop_set_deadline_us(loop, loop_refresh_now_us(loop) + 1000);
+    TEST_ASSERT_TRUE(loop_run_once(loop));
+    settle(1000);
+    expect_at_host(next_host, "answer");
+    close(next_host);
+    loop_remove(loop, other[0]);
+    close(other[0]);
+    close(other[1]);
 }
 
 /* Writes until there is no more room. Returns how many bytes went. */
@@ -447,6 +484,7 @@ int main(void)
     RUN_TEST(test_bytes_sent_just_before_closing_still_arrive);
     RUN_TEST(test_bytes_written_without_a_host_are_discarded);
     RUN_TEST(test_answers_that_a_host_left_unread_do_not_reach_the_next);
+    RUN_TEST(test_the_answer_of_the_next_host_survives_late_news_of_the_last);
     RUN_TEST(test_more_unread_bytes_than_one_buffer_holds_do_not_reach_the_next_host);
     RUN_TEST(test_full_host_end_takes_less_and_reports_room_later);
     RUN_TEST(test_host_that_goes_while_the_end_is_full_gives_room);

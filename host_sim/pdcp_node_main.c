@@ -47,7 +47,7 @@ typedef struct {
 /* --- arguments --- */
 
 static const struct argp_option option_table[] = {
-    {"can", 'c', "BUS", 0, "Bus to join: socketcan:IFACE or socketcand:HOST:PORT/NAME", 0},
+    {"can", 'c', "BUS", 0, "Bus to join: " LINUX_CAN_CHOICES, 0},
     {"seed", OPTION_SEED, "N", 0, "Start of the random numbers; the same seed asks for the same node ids", 0},
     {"stats", OPTION_STATS, NULL, 0, "Write counters to standard error at the end, one JSON object", 0},
     {0},

@@ -6,17 +6,23 @@
 #include <stdlib.h>
 #include <string.h>
 
-enum { KEY_NO_AUTOCONFIG = 256, KEY_STRICT_CRC, KEY_CONFIG };
+#include "arb_version.h"
+#include "linux_can.h"
+#include "pdcpd_list.h"
+
+enum { KEY_NO_AUTOCONFIG = 256, KEY_STRICT_CRC, KEY_CONFIG, KEY_LIST, KEY_VERSION };
 
 static const struct argp_option table[] = {
-    {"can", 'c', "BUS", 0, "Bus: sim, sim:TCPPORT, socketcan:INTERFACE, socketcand:HOST:PORT/NAME", 0},
-    {"host", 'H', "PORT", 0, "Host: pty, pty:LINKPATH", 0},
+    {"can", 'c', "BUS", 0, "Bus: sim, sim:TCPPORT, " LINUX_CAN_CHOICES, 0},
+    {"host", 'H', "PORT", 0, "Host: pty, pty:LINKPATH, serial:DEVICE[@BAUD] (128000)", 0},
     {"nvm", 'n', "FILE", 0, "File that keeps what outlives a power cycle; without it nothing is kept", 0},
     {"node", 'd', "FILE", 0, "Put a simulated device into this process (with sim only; repeatable)", 0},
     {"no-autoconfig", KEY_NO_AUTOCONFIG, NULL, 0, "Make no links unasked", 0},
     {"strict-crc", KEY_STRICT_CRC, NULL, 0, "Refuse host messages with wrong checksums", 0},
     {"log", 'l', "LEVEL", 0, "error, warning (default), info or debug; written to standard error", 0},
     {"config", KEY_CONFIG, "FILE", 0, "INI file, section [pdcpd], keys named like these options", 0},
+    {"list", KEY_LIST, NULL, 0, "Print what this machine has for --can and --host, and end", -1},
+    {"version", KEY_VERSION, NULL, 0, "Print the version and end", -1},
     {0},
 };
 
@@ -81,6 +87,12 @@ static error_t on_option(int key, char *text, struct argp_state *state)
     case KEY_STRICT_CRC:
         options->strict_crc = true;
         return 0;
+    case KEY_LIST:
+        pdcpd_list(stdout);
+        exit(EXIT_SUCCESS);
+    case KEY_VERSION:
+        (void)printf("pdcpd %d.%d.%d\n", ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH);
+        exit(EXIT_SUCCESS);
     case 'l':
         if (!parse_level(text, &options->log)) {
             argp_failure(NULL, PDCPD_EXIT_USAGE, 0, "--log: '%s' is not one of error, warning, info, debug",
@@ -183,6 +195,11 @@ static void read_file(pdcpd_options_t *options, bool log_given)
     pdcpd_options_free(&file.options);
 }
 
+static bool is_sim(const char *bus)
+{
+    return strcmp(bus, "sim") == 0 || strncmp(bus, "sim:", 4) == 0;
+}
+
 static void check(const pdcpd_options_t *options)
 {
     const char *missing = options->can == NULL ? "--can BUS" : options->host == NULL ? "--host PORT" : NULL;
@@ -190,8 +207,14 @@ static void check(const pdcpd_options_t *options)
         (void)fprintf(stderr, "pdcpd: %s is missing; --help tells more\n", missing);
         exit(PDCPD_EXIT_USAGE);
     }
-    const bool sim = strcmp(options->can, "sim") == 0 || strncmp(options->can, "sim:", 4) == 0;
-    if (options->node_count != 0 && !sim) {
+    if (!is_sim(options->can) && strncmp(options->can, "socketcan:", 10) != 0 &&
+        strncmp(options->can, "socketcand:", 11) != 0 && strncmp(options->can, "gs_usb", 6) != 0) {
+        (void)fprintf(stderr,
+                      "pdcpd: %s: not a bus; expected one of sim, sim:TCPPORT, " LINUX_CAN_CHOICES "\n",
+                      options->can);
+        exit(PDCPD_EXIT_USAGE);
+    }
+    if (options->node_count != 0 && !is_sim(options->can)) {
         (void)fprintf(stderr, "pdcpd: --node goes with --can sim only, not with %s\n", options->can);
         exit(PDCPD_EXIT_USAGE);
     }

@@ -5,7 +5,8 @@
 
 #include "linux_can_backend.h"
 
-static const linux_can_backend_t *const backends[] = {&can_socketcan_backend, &can_socketcand_backend};
+static const linux_can_backend_t *const backends[] = {&can_socketcan_backend, &can_socketcand_backend,
+                                                      &can_gs_usb_backend};
 
 #define BACKENDS (sizeof backends / sizeof backends[0])
 
@@ -23,19 +24,32 @@ void linux_can_refuse(const linux_can_request_t *request, const char *reason)
     snprintf(request->error, request->error_size, "%s: %s", request->bus, reason);
 }
 
+/* What follows the kind in BUS and its colon; NULL: BUS is of another kind. */
+static const char *address_in(const char *bus, const linux_can_backend_t *backend)
+{
+    size_t length = strlen(backend->kind);
+    const char *rest = bus + length;
+    if (strncmp(bus, backend->kind, length) != 0) {
+        return NULL;
+    }
+    if (rest[0] == ':') {
+        return rest + 1;
+    }
+    return backend->address_optional && (rest[0] == '\0' || rest[0] == '/') ? rest : NULL;
+}
+
 hal_can_t *linux_can_open(loop_t *loop, const char *bus, linux_can_ready_t ready, void *ctx, char *error,
                           size_t error_size)
 {
     linux_can_request_t request = {
         .loop = loop, .bus = bus, .ready = ready, .ctx = ctx, .error = error, .error_size = error_size};
     for (size_t i = 0; i < BACKENDS; i++) {
-        size_t length = strlen(backends[i]->kind);
-        if (strncmp(bus, backends[i]->kind, length) == 0 && bus[length] == ':') {
-            request.address = bus + length + 1;
+        request.address = address_in(bus, backends[i]);
+        if (request.address != NULL) {
             return backends[i]->open(&request);
         }
     }
-    linux_can_refuse(&request, "not a CAN bus; expected socketcan:IFACE or socketcand:HOST:PORT/NAME");
+    linux_can_refuse(&request, "not a CAN bus; expected one of " LINUX_CAN_CHOICES);
     return NULL;
 }
 

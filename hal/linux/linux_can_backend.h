@@ -13,7 +13,7 @@
 typedef struct {
     loop_t *loop;
     const char *bus;     /* as the user wrote it, for messages */
-    const char *address; /* what follows the kind and its colon */
+    const char *address; /* what follows the kind and its colon, or the kind alone */
     linux_can_ready_t ready;
     void *ctx;
     char *error;
@@ -24,6 +24,7 @@ typedef struct {
  * by the backend, which calls ready when it has changed. */
 typedef struct {
     const char *kind;
+    bool address_optional; /* BUS may be the kind alone, or the kind and a slash with more */
     hal_can_t *(*open)(const linux_can_request_t *request);
     void (*close)(hal_can_t *can);
     bool (*send)(hal_can_t *can, const can_frame_t *frame);
@@ -42,6 +43,7 @@ struct hal_can {
 
 extern const linux_can_backend_t can_socketcan_backend;
 extern const linux_can_backend_t can_socketcand_backend;
+extern const linux_can_backend_t can_gs_usb_backend;
 
 /* Sets the fields of *can; the state is HAL_CAN_DOWN. */
 void linux_can_init(hal_can_t *can, const linux_can_backend_t *backend, const linux_can_request_t *request);

@@ -203,7 +203,7 @@ static void test_buses_that_cannot_be_opened_are_refused_by_name(void)
     expect_refused("socketcan:much-too-long-a-name",
                    "socketcan:much-too-long-a-name: no such network interface");
     expect_refused("socketcan:lo", "socketcan:lo: not a CAN interface");
-    expect_refused("vcan0", "vcan0: not a CAN bus; expected socketcan:IFACE or socketcand:HOST:PORT/NAME");
+    expect_refused("vcan0", "vcan0: not a CAN bus; expected one of " LINUX_CAN_CHOICES);
 }
 
 static void test_frames_pass_in_both_directions_and_own_ones_do_not_return(void)

@@ -47,7 +47,7 @@ static void check(const gs_usb_codec_constants_t *peripheral, uint32_t clock_hz,
     TEST_ASSERT_EQUAL_UINT32(expected.brp, timing.brp);
 }
 
-/* prop, phase1, phase2, sjw, brp. */
+/* D-LIN-2. prop, phase1, phase2, sjw, brp. */
 static void test_48_mhz(void)
 {
     check(&bxcan, 48000000, (gs_usb_codec_timing_t){1, 12, 2, 1, 3}); /* 16 quanta, 87.5 % */

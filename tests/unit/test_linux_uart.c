@@ -404,7 +404,7 @@ static void test_stale_link_is_replaced(void)
     expect_link_to_us();
 }
 
-/* A second program does not take a running one's host away. */
+/* D-LIN-4: a second program does not take a running one's host away. */
 static void test_link_of_a_running_program_is_left(void)
 {
     char port[80];

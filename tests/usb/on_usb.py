@@ -167,7 +167,7 @@ def check_errors_and_bus_off(bench: Bench, adapter: Adapter, limb: Limb) -> None
 
 
 def check_unplugs(bench: Bench, adapter: Adapter, limb: Limb) -> None:
-    """Pulled out and plugged in ten times: the daemon waits without much work, comes back, and the limb goes on."""
+    """D-LIN-1: pulled out and plugged in ten times: the daemon waits without much work, comes back, and the limb goes on."""
     times: list[float] = []
     for i in range(UNPLUGS):
         adapter.unplug()
@@ -222,7 +222,7 @@ def ten_thousand_frames_each_way(bench: Bench) -> None:
 
 
 def bus_off_in_a_stream_loses_no_frame(bench: Bench) -> None:
-    """Bus-off stops the stream; the host's restart lets it go on where it stopped."""
+    """D-LIN-3: bus-off stops the stream; the host's restart lets it go on where it stopped."""
     with Adapter(bench.programs, bench.folder) as adapter:
         other = open_stream(bench, VCAN, "222", 0, FRAMES_SHORT)
         stream = open_stream(bench, "gs_usb", "111", FRAMES_SHORT, 0)
@@ -247,7 +247,7 @@ def fd_firmware_that_pads_its_packets(bench: Bench) -> None:
 
 
 def old_firmware_is_reset_after_bus_off(bench: Bench) -> None:
-    """Firmware that only a reset brings back from bus-off: what it throws away then is counted as not sent."""
+    """D-LIN-3: firmware that only a reset brings back from bus-off: what it throws away then is counted as not sent."""
     with Adapter(bench.programs, bench.folder, "old") as adapter:
         other = open_stream(bench, VCAN, "222", 0, 1)
         stream = open_stream(bench, "gs_usb", "111", FRAMES_SHORT, 0)

@@ -229,6 +229,11 @@ void arb_hostapi_on_frame(arb_hostapi_t *api, const arb_port_t *port, uint32_t n
 void arb_hostapi_on_host_gone(arb_hostapi_t *api)
 {
     arb_hostevents_end(&api->events);
+    for (uint8_t i = 0; i < api->held_count; i++) {
+        if (api->held[i].id == ARB_MSG_EVENT_STREAM) {
+            api->held[i].error = ARB_ERR_NOT_READY; /* it would be the next host's */
+        }
+    }
 }
 
 bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms)

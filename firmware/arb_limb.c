@@ -440,14 +440,20 @@ static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
     }
 }
 
+/* Is there something to be saved, and nothing in the way? */
+static bool may_auto_save(const arb_limb_t *limb)
+{
+    return limb->unsaved && limb->stage == STAGE_IDLE && !profile_run_is_busy(&limb->run) &&
+           (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0;
+}
+
 static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     if (profile_run_take_change(&limb->run)) {
         limb->unsaved = true;
         limb->changed_ms = now_ms;
     }
-    if (limb->unsaved && limb->stage == STAGE_IDLE && !profile_run_is_busy(&limb->run) &&
-        (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0 &&
+    if (may_auto_save(limb) &&
         pdcp_time_reached(now_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS)) {
         limb->changed_ms = now_ms; /* if it fails, again after the same time */
         (void)begin_save(limb, arb, now_ms, 0);
@@ -483,7 +489,7 @@ uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_
     uint32_t next_ms = profile_run_next_ms(&limb->run, arb, now_ms);
     next_ms = earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
     next_ms = earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
-    if (limb->unsaved && (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0) {
+    if (may_auto_save(limb)) {
         next_ms = earlier(next_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS);
     }
     return next_ms;

@@ -172,6 +172,9 @@ static void on_server_changed(void *ctx)
 
 static void take_host_bytes(daemon_t *daemon, uint32_t now_ms)
 {
+    if (linux_uart_host_left(daemon->uart)) {
+        arb_app_on_host_gone(&daemon->app);
+    }
     for (;;) {
         if (daemon->host_count == 0) {
             daemon->host_count = hal_uart_read(daemon->uart, daemon->host_bytes, HOST_BATCH);
@@ -204,7 +207,9 @@ static void on_can_ready(void *ctx)
             arb_app_on_frame(&daemon->app, now_ms, &frames[i]);
         }
     } while (count == RECEIVE_BATCH);
-    arb_app_on_state(&daemon->app, now_ms, (pdcp_bus_state_t)hal_can_health(daemon->can).state);
+    const hal_can_health_t health = hal_can_health(daemon->can);
+    arb_app_on_errors(&daemon->app, health.tx_errors, health.rx_errors);
+    arb_app_on_state(&daemon->app, now_ms, (pdcp_bus_state_t)health.state);
 }
 
 /* One turn with a bus outside. */
@@ -321,13 +326,13 @@ static bool open_all(daemon_t *daemon)
     if (daemon->loop == NULL) {
         return complain("the event loop cannot be made");
     }
-    if (!open_bus(daemon)) {
-        return false;
-    }
     daemon->uart =
         linux_uart_open(daemon->loop, daemon->options.host, on_uart_ready, daemon, error, sizeof error);
     if (daemon->uart == NULL) {
         return complain(error);
+    }
+    if (!open_bus(daemon)) {
+        return false;
     }
     daemon->nvm = linux_nvm_open(daemon->options.nvm, error, sizeof error);
     if (daemon->nvm == NULL) {
@@ -345,7 +350,9 @@ static bool start(daemon_t *daemon)
                                 .nvm_read = nvm_read,
                                 .nvm_write = nvm_write,
                                 .nvm_status = nvm_status};
-    const arb_settings_t settings = {.serial = hal_sys_serial(), .strict_crc = daemon->options.strict_crc};
+    const arb_settings_t settings = {.serial = hal_sys_serial(),
+                                     .strict_crc = daemon->options.strict_crc,
+                                     .no_autoconfig = daemon->options.no_autoconfig};
     const uint32_t now_ms = (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);
     arb_app_init(&daemon->app, &daemon->port, &settings, now_ms);
     arb_app_observe(&daemon->app, on_event, daemon);

@@ -6,11 +6,22 @@
 #include "pdcp_setup.h"
 #include "pdcp_time.h"
 
+/* No deadline but that of a controller which is about to leave bus-off. */
+static void forget_deadlines(pdcp_arb_t *arb)
+{
+    const bool recovers = arb->recovery.state == PDCP_BUS_OFF &&
+                          pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_RECOVERY);
+    pdcp_timers_init(&arb->bus.timers);
+    if (recovers) {
+        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_RECOVERY, arb->recovery.changed_ms + arb->recovery.pause_ms);
+    }
+}
+
 /* Nothing is known of the bus; what is remembered and counted stays. */
 static void forget_bus(pdcp_arb_t *arb, uint32_t now_ms)
 {
     pdcp_nodes_init(&arb->bus.nodes);
-    pdcp_timers_init(&arb->bus.timers);
+    forget_deadlines(arb);
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->link);
     memset(arb->bind.reserved, 0, sizeof arb->bind.reserved);

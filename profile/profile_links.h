@@ -13,7 +13,7 @@
 #include "profile_config.h"
 
 #ifndef PROFILE_LINKS_MAX
-#define PROFILE_LINKS_MAX 48 /* links of the active configuration, 1 to 254; 2401h tells it */
+#define PROFILE_LINKS_MAX 48 /* links of the active configuration, 1 to 254 (D-PRO-11) */
 #endif
 
 #ifndef PROFILE_PARTS_MAX

@@ -136,9 +136,8 @@ typedef struct {
     uint16_t profile;
 } model_t;
 
-static uint8_t score_of(work_t *work, uint8_t channel, const model_t *model)
+static uint8_t score_of(const work_t *work, uint8_t channel, const model_t *model)
 {
-    work->plan->steps++;
     return profile_similarity(channel_of(work, channel)->type, channel_of(work, channel)->profile,
                               model->type, model->profile);
 }
@@ -162,9 +161,15 @@ static bool is_candidate(const work_t *work, uint8_t channel, uint8_t transfer, 
     return may_link(work, partner, channel) && is_spare(work, channel);
 }
 
+static void begin_search(work_t *work)
+{
+    const uint32_t left = (uint32_t)PROFILE_PLAN_STEPS - work->plan->steps;
+    work->steps_end = work->plan->steps + left / PROFILE_PLAN_SHARE;
+}
+
 static bool may_search(const work_t *work)
 {
-    return work->plan->steps < work->steps_end && work->plan->steps < PROFILE_PLAN_STEPS;
+    return work->plan->steps + PDCP_CHANNELS_MAX <= work->steps_end;
 }
 
 /* The channel that comes next behind `tried` in the order of likeness to the model, among those that may be
@@ -175,7 +180,11 @@ static uint8_t next_candidate(work_t *work, const model_t *model, uint8_t transf
     uint8_t best = PDCP_NONE;
     uint8_t best_score = PROFILE_CANDIDATE_MIN;
     const uint8_t tried_score = tried != PDCP_NONE ? score_of(work, tried, model) : UINT8_MAX;
-    for (uint8_t c = 0; c < PDCP_CHANNELS_MAX && may_search(work); c++) {
+    if (!may_search(work)) {
+        return PDCP_NONE;
+    }
+    for (uint8_t c = 0; c < PDCP_CHANNELS_MAX; c++) {
+        work->plan->steps++;
         if (!is_candidate(work, c, transfer, partner)) {
             continue;
         }
@@ -190,7 +199,7 @@ static uint8_t next_candidate(work_t *work, const model_t *model, uint8_t transf
             best_score = score;
         }
     }
-    return may_search(work) ? best : PDCP_NONE;
+    return best;
 }
 
 static uint8_t next_of_source(work_t *work, const frame_t *frame, uint8_t entry)
@@ -268,9 +277,8 @@ static uint8_t next_need(const work_t *work, frame_t *frame)
         }
         uint8_t c = frame->cursor != PDCP_NONE ? channel_of(work, frame->cursor)->next : owner->first_channel;
         for (; c != PDCP_NONE; c = channel_of(work, c)->next) {
-            if (!is_connected(work, c) &&
-                pdcp_nodes_needs(work->nodes, by, frame->need >= DESIRED_BY_OUTPUT,
-                                 channel_of(work, c)->index)) {
+            if (!is_connected(work, c) && pdcp_nodes_needs(work->nodes, by, frame->need >= DESIRED_BY_OUTPUT,
+                                                           channel_of(work, c)->index)) {
                 frame->cursor = c;
                 return c;
             }
@@ -331,7 +339,7 @@ static bool connect_input(work_t *work, uint8_t input, uint8_t given, source_t f
 {
     work->depth = 0;
     work->logged = 0;
-    work->steps_end = work->plan->steps + PROFILE_PLAN_TRY;
+    begin_search(work);
     push(work, input, first, last);
     work->frames[0].given = given;
     while (work->depth != 0) {
@@ -355,9 +363,8 @@ static bool lacks_need(const work_t *work, uint8_t input)
     return next_need(work, &frame) != PDCP_NONE && frame.need < DESIRED_BY_OUTPUT;
 }
 
-/* Would this link still have all that it requires, directly and indirectly, if those that lack something now
- * went? */
-static bool holds(work_t *work, uint8_t input)
+/* Marks as gone the links that lack something they require, and those that require one of these. */
+static void find_gone(work_t *work)
 {
     bool changed = true;
     while (changed) {
@@ -369,9 +376,6 @@ static bool holds(work_t *work, uint8_t input)
             }
         }
     }
-    const bool remains = is_connected(work, input);
-    memset(work->gone, 0, sizeof work->gone);
-    return remains;
 }
 
 /* --- Originals [PROFILE listing 4.3], D-PRO-6 --- */
@@ -450,22 +454,48 @@ static bool link_original(work_t *work, uint8_t number)
     return linked;
 }
 
+static bool is_original(const work_t *work, uint8_t input)
+{
+    const uint8_t own = profile_links_of(work->scene->links, work->nodes, input);
+    return own != PDCP_NONE && work->plan->want[input] != PDCP_NONE &&
+           work->out[own] == work->plan->want[input];
+}
+
+/* Has the link of this input all that it requires, and has no original lost that which it had? lacking:
+ * inputs whose links were lacking something before. */
+static bool is_worth_it(work_t *work, uint8_t input, const uint8_t *lacking)
+{
+    find_gone(work);
+    bool good = !get_bit(work->gone, input);
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        good = good && !(get_bit(work->gone, i) && !get_bit(lacking, i) && is_original(work, i));
+    }
+    memset(work->gone, 0, sizeof work->gone);
+    return good;
+}
+
 /* Makes a link of the configuration whose ends are both there; what stood in for them goes. */
 static void bring_back(work_t *work, uint8_t number)
 {
     profile_entry_t *entry = &work->scene->links->entries[number];
     const uint8_t input = work->in[number];
     const uint8_t output = work->out[number];
+    uint8_t lacking[PROFILE_CHANNEL_BYTES];
     forget_stand_ins(work);
     const uint8_t other =
         profile_is_sole(channel_of(work, input)) ? sole_input(work, output, input) : PDCP_NONE;
+    const bool takes = other != PDCP_NONE && other != entry->stand_in && is_standing_in(work, other);
+    const bool costs = work->plan->want[input] != PDCP_NONE || entry->stand_in != PDCP_NONE || takes;
+    if (costs) {
+        find_gone(work);
+        memcpy(lacking, work->gone, sizeof lacking);
+        memset(work->gone, 0, sizeof work->gone);
+    }
     const replaced_t source = take_away(work, input);
     const replaced_t stand_in = take_away(work, entry->stand_in);
-    const bool takes = other != PDCP_NONE && other != entry->stand_in && is_standing_in(work, other);
     const replaced_t rival = take_away(work, takes ? other : PDCP_NONE);
     const bool linked = link_original(work, number);
-    const bool costs = stand_in.output != PDCP_NONE || rival.output != PDCP_NONE;
-    if (linked && (!costs || holds(work, input))) {
+    if (linked && (!costs || is_worth_it(work, input, lacking))) {
         entry->stand_in = PDCP_NONE;
         return;
     }
@@ -482,7 +512,7 @@ static void bring_back_all(work_t *work)
         for (uint8_t e = 0; e < links->count; e++) {
             if (work->in[e] != PDCP_NONE && work->out[e] != PDCP_NONE &&
                 profile_is_terminal(channel_of(work, work->in[e])) == (pass == 1) &&
-                (work->plan->want[work->in[e]] != work->out[e] || links->entries[e].stand_in != PDCP_NONE)) {
+                work->plan->want[work->in[e]] != work->out[e]) {
                 bring_back(work, e);
             }
         }
@@ -516,7 +546,7 @@ static bool is_broken(const work_t *work, uint8_t number)
 /* How alike the two ends would be with the best replacement, plus 1; 0: there is none. */
 static uint8_t repair_key(work_t *work, uint8_t number)
 {
-    work->steps_end = work->plan->steps + PROFILE_PLAN_TRY;
+    begin_search(work);
     const uint8_t found = is_broken(work, number) ? replacement_of(work, number, PDCP_NONE) : PDCP_NONE;
     if (found == PDCP_NONE) {
         return 0;
@@ -534,7 +564,7 @@ static void repair(work_t *work, uint8_t number)
         return;
     }
     uint8_t tried = PDCP_NONE;
-    work->steps_end = work->plan->steps + PROFILE_PLAN_TRY;
+    begin_search(work);
     while ((tried = replacement_of(work, number, tried)) != PDCP_NONE) {
         if (connect_input(work, tried, work->out[number], SOURCE_GIVEN, SOURCE_GIVEN)) {
             work->scene->links->entries[number].stand_in = tried;
@@ -589,8 +619,8 @@ static uint8_t fed_instead(work_t *work, uint8_t output, const model_t *missing)
     return best;
 }
 
-/* An output whose input is missing may have been connected as what a replacement requires: it stands in, too, and
- * goes when the original comes back. True: there was such a one. */
+/* An output whose input is missing may have been connected as what a replacement requires: it stands in, too,
+ * and goes when the original comes back. True: there was such a one. */
 static bool name_stand_ins(work_t *work)
 {
     bool any = false;

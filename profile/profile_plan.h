@@ -18,17 +18,18 @@ typedef enum {
     PROFILE_PLAN_ORIGINALS = 1, /* the links of the active configuration whose ends are there (D-PRO-6) */
     PROFILE_PLAN_REPLACE = 2,   /* replacements for missing ends [PROFILE listing 4.6] */
     PROFILE_PLAN_AUTO = 4,      /* unconnected terminal channels [PROFILE listing 4.7] */
-    PROFILE_PLAN_ALL = 7
+    PROFILE_PLAN_ALL = 7,
+    PROFILE_PLAN_SETTLE = 8 /* nothing new: links that miss a required input rest, as they do in every plan */
 } profile_plan_what_t;
 
 enum {
-    PROFILE_PLAN_DEPTH = 24, /* a chain of required inputs is followed so far; deeper ones fail */
+    PROFILE_PLAN_DEPTH = 64, /* a chain of required inputs is followed so far; deeper ones fail */
+    PROFILE_PLAN_SHARE = 8,  /* the search for one link with all that it requires may take one part in so many
+                                of the steps that are left: those behind it get theirs */
     PROFILE_BANNED_MAX = 8
 };
 
-/* Channels compared in the search for one link with all that it requires, and in one plan. What is not found
- * within is not found. */
-#define PROFILE_PLAN_TRY 8000uL
+/* Channels looked at in one plan. What is not found within is not found. */
 #define PROFILE_PLAN_STEPS 200000uL
 
 /* A link that a device has refused or not answered: not planned until the ban is lifted. */
@@ -54,7 +55,7 @@ typedef struct {
 
 typedef struct {
     uint8_t want[PDCP_CHANNELS_MAX]; /* of inputs: channel number of the source, PDCP_NONE: none */
-    uint32_t steps;                  /* channels compared */
+    uint32_t steps;                  /* channels looked at */
 } profile_plan_t;
 
 /* Makes a plan. what: profile_plan_what_t bits. */

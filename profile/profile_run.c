@@ -71,13 +71,13 @@ static void put_link(profile_run_t *run, const profile_link_t *link, bool by_hos
     }
 }
 
-/* The link that an input has, or whose source it names. False: it may not become one of the configuration, because it
- * would break sole access: a device may remember what it stood in for once. At the start-up all count. */
+/* The link that an input has, or whose source it names. False: it may not become one of the configuration,
+ * because it would break sole access: a device may remember what it stood in for once. */
 static bool link_of(const profile_run_t *run, const pdcp_arb_t *arb, uint8_t input, profile_link_t *link)
 {
     profile_end_of(nodes_of(arb), input, &link->input);
     return profile_source_of(nodes_of(arb), input, &link->output) &&
-           (run->state == PROFILE_WAITING || !profile_links_is_claimed(&run->links, link));
+           !profile_links_is_claimed(&run->links, link);
 }
 
 static void adopt_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
@@ -141,13 +141,31 @@ bool profile_run_is_complete(const profile_run_t *run, const pdcp_arb_t *arb)
     return true;
 }
 
-/* Reads the configuration back from what the inputs of a device name as their sources; PDCP_NONE: of all. */
+/* The input of a device (PDCP_NONE: of any) that comes next behind the last one; PDCP_NONE: there are no
+ * more. */
+static uint8_t next_read_back(const pdcp_nodes_t *nodes, uint8_t node, uint8_t last)
+{
+    uint8_t best = PDCP_NONE;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (profile_is_ready(nodes, i, PDCP_INPUT) &&
+            (node == PDCP_NONE || nodes->channels[i].node == node) &&
+            (last == PDCP_NONE || profile_is_before(nodes, last, i)) &&
+            (best == PDCP_NONE || profile_is_before(nodes, i, best))) {
+            best = i;
+        }
+    }
+    return best;
+}
+
+/* Reads the configuration back from what the inputs of a device name as their sources; PDCP_NONE: of all. In
+ * an order that does not depend on where they stand: of two that claim the same output the first one has it.
+ */
 static void read_back(profile_run_t *run, const pdcp_arb_t *arb, uint8_t node)
 {
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (profile_is_ready(nodes_of(arb), i, PDCP_INPUT) &&
-            (node == PDCP_NONE || channel_of(arb, i)->node == node) && entry_of(run, arb, i) == PDCP_NONE) {
-            adopt_link(run, arb, i);
+    uint8_t input = PDCP_NONE;
+    while ((input = next_read_back(nodes_of(arb), node, input)) != PDCP_NONE) {
+        if (entry_of(run, arb, input) == PDCP_NONE) {
+            adopt_link(run, arb, input);
         }
     }
 }
@@ -169,8 +187,8 @@ bool profile_run_load_link(profile_run_t *run, const profile_link_t *link)
     return profile_links_put(&run->links, link, false);
 }
 
-/* The entry that the working link of an input replaces: the one that it stands in for, or its own if its source is
- * another. PDCP_NONE: there is none. */
+/* The entry that the working link of an input replaces: the one that it stands in for, or its own if its
+ * source is another. PDCP_NONE: there is none. */
 static uint8_t replaced_by(const profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
     for (uint8_t e = 0; e < run->links.count; e++) {
@@ -179,9 +197,9 @@ static uint8_t replaced_by(const profile_run_t *run, const pdcp_arb_t *arb, uint
         }
     }
     const uint8_t own = entry_of(run, arb, input);
-    const bool other = own != PDCP_NONE && profile_links_channel(&run->links, nodes_of(arb),
-                                                                 &run->links.entries[own].output,
-                                                                 PDCP_OUTPUT) != channel_of(arb, input)->feed;
+    const bool other =
+        own != PDCP_NONE && profile_links_channel(&run->links, nodes_of(arb), &run->links.entries[own].output,
+                                                  PDCP_OUTPUT) != channel_of(arb, input)->feed;
     return other ? own : PDCP_NONE;
 }
 
@@ -233,8 +251,28 @@ static void plan_soon(profile_run_t *run, uint32_t now_ms, bool urgent)
     run->urgent = run->urgent || urgent;
 }
 
+/* The host has changed a link: what follows from it. */
+static void plan_at_once(profile_run_t *run, profile_plan_what_t what)
+{
+    if (run->state != PROFILE_WAITING) {
+        run->due = (uint8_t)(run->due | (uint8_t)what);
+        run->urgent = true;
+    }
+}
+
+/* A device has left: nothing of its links is being taken away any more. */
+static void forget_dropping(profile_run_t *run, const pdcp_arb_t *arb, uint8_t node)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (channel_of(arb, i)->node == node) {
+            set_bit(run->dropping, i, false);
+        }
+    }
+}
+
 static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
+    forget_dropping(run, arb, node);
     set_bit(run->awaited, node, false);
     if (run->state != PROFILE_WAITING && !run->stored) {
         read_back(run, arb, node);
@@ -248,10 +286,22 @@ static void ban(profile_run_t *run, uint32_t now_ms)
         run->banned_count--;
         memmove(&run->banned[0], &run->banned[1], run->banned_count * sizeof run->banned[0]);
     }
+    run->tries = 1;
     run->banned[run->banned_count].output = run->wish_output;
     run->banned[run->banned_count].input = run->wish_input;
     run->banned_count++;
     run->retry_ms = now_ms + PROFILE_RETRY_MS;
+}
+
+/* Is a link to be tried again? On a bad line, or when a device was away for a moment, an answer is missing
+ * now and then, which must not lead to another limb. */
+static bool is_worth_another_try(profile_run_t *run, pdcp_status_t status)
+{
+    if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
+        return false;
+    }
+    run->tries++;
+    return true;
 }
 
 /* A link that was asked for is made, or is not. */
@@ -260,31 +310,48 @@ static void on_wish(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, 
     if (!run->wishing) { /* it was the host's */
         if (event->status == PDCP_OK) {
             put_host_link(run, arb, event->channel);
+            plan_at_once(run, PROFILE_PLAN_ORIGINALS); /* what rested for want of it comes back */
         }
         return;
     }
     run->wishing = false;
     if (event->status == PDCP_OK) {
+        run->tries = 1;
         set_bit(run->made, run->wish_input, true);
         run->moves++;
     } else {
-        ban(run, now_ms);
+        if (!is_worth_another_try(run, (pdcp_status_t)event->status)) {
+            ban(run, now_ms);
+        }
         run->due = (uint8_t)(run->due | run->what);
         run->urgent = true;
     }
 }
 
-/* An input's device has asked for its link (Update Data Channel), which may be missing what it requires. */
+/* An input's device has asked for its link (Update Data Channel). It may lack what it requires, or break sole
+ * access: then it does not count as working, and the plan decides. */
 static void on_asked(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input, uint8_t entry)
 {
+    const pdcp_channel_t *channel = channel_of(arb, input);
     if (entry == PDCP_NONE && !is_stand_in(run, input)) {
         adopt_link(run, arb, input);
     }
-    if (channel_of(arb, input)->link == PDCP_LINK_ACTIVE &&
-        channel_of(arb, input)->feed != run->plan.want[input]) {
+    if (channel->link == PDCP_LINK_ACTIVE && channel->feed != run->plan.want[input]) {
+        set_bit(run->made, input, profile_breaks_sole_access(nodes_of(arb), channel->feed, input));
         run->due = (uint8_t)(run->due | hot_swap_what(run));
         run->urgent = true;
     }
+}
+
+/* The host has taken a link away: it is none of the configuration any more, no plan makes it again, and what requires its
+ * input rests. */
+static void on_removed(profile_run_t *run, uint8_t entry)
+{
+    if (entry != PDCP_NONE && !run->frozen) {
+        profile_links_remove(&run->links, entry);
+        run->changed = true;
+    }
+    plan_at_once(run, PROFILE_PLAN_SETTLE);
 }
 
 /* The link of an input has changed, by whomever. */
@@ -293,10 +360,8 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     const uint8_t status = channel_of(arb, input)->link;
     const uint8_t entry = entry_of(run, arb, input);
     if (status == PDCP_LINK_NONE) {
-        if (!get_bit(run->dropping, input) && entry != PDCP_NONE &&
-            !run->frozen) { /* the host took it away */
-            profile_links_remove(&run->links, entry);
-            run->changed = true;
+        if (arb->link.kind == PDCP_TODO_REMOVE && !get_bit(run->dropping, input)) {
+            on_removed(run, entry);
         }
         set_bit(run->dropping, input, false);
     } else if (run->state != PROFILE_WAITING && !run->stored && !run->wishing &&
@@ -352,9 +417,25 @@ static profile_scene_t scene_of(profile_run_t *run, const pdcp_arb_t *arb)
     return scene;
 }
 
+/* What the plan under way was about to take away does not count as working for the next one, which would not
+ * know any more that it only stood in. */
+static void leave_unwanted(profile_run_t *run, const pdcp_arb_t *arb)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *channel = channel_of(arb, i);
+        if (profile_is_ready(nodes_of(arb), i, PDCP_INPUT) && channel->link == PDCP_LINK_ACTIVE &&
+            channel->feed != run->plan.want[i]) {
+            set_bit(run->made, i, true);
+        }
+    }
+}
+
 static void make_plan(profile_run_t *run, const pdcp_arb_t *arb)
 {
     const profile_scene_t scene = scene_of(run, arb);
+    if (run->planning) {
+        leave_unwanted(run, arb);
+    }
     run->state = PROFILE_CONFIGURING;
     run->planning = true;
     run->due = 0;
@@ -385,6 +466,7 @@ void profile_run_begin(profile_run_t *run, pdcp_arb_t *arb, profile_purpose_t pu
 {
     memset(run->made, 0, sizeof run->made);
     run->banned_count = 0;
+    run->tries = 1;
     run->moves = 0;
     run->purpose = (uint8_t)purpose;
     run->what = what;

@@ -18,6 +18,7 @@ enum {
     PROFILE_QUIET_MS = 500,   /* start-up waits until nothing has been bound or set up for so long */
     PROFILE_ARRIVAL_MS = 500, /* the plan for a new device waits so long for others that are being set up */
     PROFILE_RESET_MS = 3000,  /* a device that the host has reset is not lost so soon (profile-layer.md 4) */
+    PROFILE_TRIES_MAX = 3,    /* of a link whose device does not answer, before the next candidate is tried */
     PROFILE_RETRY_MS = 5000   /* links that could not be made are tried again */
 };
 
@@ -45,6 +46,7 @@ typedef struct {
     uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
     uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
     uint8_t banned_count;
+    uint8_t tries;      /* of the link that is being made, this one included */
     uint8_t state;      /* profile_state_t */
     uint8_t purpose;    /* profile_purpose_t of the plan under way */
     uint8_t what;       /* profile_plan_what_t of the plan under way */

@@ -13,6 +13,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple, Self
 
+from pdcp import Identity
+
 LINE_TIMEOUT_S = 10.0
 END_TIMEOUT_S = 5.0
 
@@ -21,7 +23,7 @@ class Value(NamedTuple):
     """What a terminal input received, from the JSON line that says so (host_sim/sim_node.h)."""
 
     time_ms: int
-    device: str  # VID:PID:SN
+    device: Identity
     channel: int
     value: int | None  # None: a float
     safe: bool  # it went to its safe value, nothing was received
@@ -33,7 +35,8 @@ class EndedError(Exception):
 
 def parse_value(line: str) -> Value:
     fields = json.loads(line)
-    return Value(fields["t_ms"], fields["device"], fields["channel"], fields["value"], fields.get("safe", False))
+    device = Identity(*(int(word, 16) for word in fields["device"].split(":")))
+    return Value(fields["t_ms"], device, fields["channel"], fields["value"], fields.get("safe", False))
 
 
 class Program:

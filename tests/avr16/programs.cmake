@@ -2,7 +2,10 @@
 #
 # Constants and texts are in RAM there. A program with too many is built in parts, which run some of its tests each
 # (target/prelude.h).
-set(avr16_parts_test_arb_app 5)
+set(avr16_parts_test_acceptance 1)
+set(avr16_parts_test_arb_app 6)
+set(avr16_parts_test_arb_hostapi 14)
+set(avr16_parts_test_arb_hostext 5)
 set(avr16_parts_test_pdcp_device 5)
 set(avr16_parts_test_pdcp_exhaustive 4)
 set(avr16_parts_test_pdcp_link 3)

@@ -8,10 +8,10 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "tools"))
+sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tests/support")]
 
-from hostapi import Host  # noqa: E402
 from programs import Pdcpd, Program  # noqa: E402
+from rawhost import RawHost  # noqa: E402
 
 DEFAULT_BIN = ROOT / "build/default/bin"
 NODE_IDS = {"d1": 16, "d2": 32, "d3": 48}
@@ -61,11 +61,11 @@ def start_node(programs: Path, stack: ExitStack) -> Callable[..., Program]:
 
 
 @pytest.fixture
-def connect(stack: ExitStack) -> Callable[[Pdcpd], Host]:
+def connect(stack: ExitStack) -> Callable[[Pdcpd], RawHost]:
     """connect(PDCPD): a host at its pseudo-terminal."""
 
-    def connect_host(pdcpd: Pdcpd) -> Host:
-        return stack.enter_context(Host(pdcpd.port()))
+    def connect_host(pdcpd: Pdcpd) -> RawHost:
+        return stack.enter_context(RawHost(pdcpd.port()))
 
     return connect_host
 

@@ -11,13 +11,17 @@ from contextlib import ExitStack
 
 import can
 import pytest
-from hostapi import Channel, FailureError, Host, Identity, encode
+from pdcp.wire import encode
 from programs import Pdcpd, until
+from rawhost import RawHost
+
+from pdcp import Channel, ChannelId, Device, Direction, ErrorCode, Identity, RequestError
 
 BEACON_MS = 100
+DEAD = 0xFF  # an id that nobody is spoken to by (D-BUS-2)
 
 Start = Callable[..., Pdcpd]
-Connect = Callable[[Pdcpd], Host]
+Connect = Callable[[Pdcpd], RawHost]
 Frame = tuple[int, bytes]  # identifier, data
 
 
@@ -29,6 +33,7 @@ class HandMade(threading.Thread):
     """Listens to the bus and plays one device on it.
 
     parameters: (parameter, channel) to value; what is not there is refused. Beacons are sent while beacons is True.
+    After so many packets of a bulk transfer as packets_left says it is dead: unplugged, without power.
     """
 
     def __init__(self, port: int, node_id: int) -> None:
@@ -38,6 +43,7 @@ class HandMade(threading.Thread):
         self.deaf_to: set[tuple[int, int]] = set()
         self.bulk: dict[tuple[int, int], bytes] = {}
         self.beacons = False
+        self.packets_left = 1000
         self.log: list[Frame] = []
         self.last_sent_s = 0.0
         self._packets: list[bytes] = []
@@ -77,7 +83,7 @@ class HandMade(threading.Thread):
     def _answer(self, data: bytes) -> bytes:
         code, rest = data[0], data[1:]
         if code == 0x8E and len(rest) == 1:  # the arbitrator has taken a packet
-            return self._packets.pop(0) if self._packets else b""
+            return self._packet()
         place = (rest[0], rest[1]) if len(rest) >= 2 else (0, 0)
         if place in self.deaf_to:
             return b""
@@ -93,8 +99,19 @@ class HandMade(threading.Thread):
             pieces = [value[at : at + 6] for at in range(0, len(value), 6)]
             self._packets = [b"\x0e" + bytes([number]) + piece for number, piece in enumerate(pieces)]
             self._put(0x200 | self.node_id, b"\x8c\x01" + rest + len(value).to_bytes(2, "little"))
-            return self._packets.pop(0)
+            return self._packet()
         return b""
+
+    def _packet(self) -> bytes:
+        """The next packet of a bulk transfer."""
+        if not self._packets:
+            return b""
+        self.packets_left -= 1
+        if self.packets_left < 0:
+            self.beacons = False
+            self.node_id = DEAD
+            return b""
+        return self._packets.pop(0)
 
     def received(self, identifier: int, code: int) -> list[bytes]:
         """Data of the frames with this identifier that begin with this function code."""
@@ -139,7 +156,7 @@ SENSOR = Identity(0x1234, 0x5678, 0x9ABC)
 SENSOR_ASKS = "01 34 12 78 56 BC 9A"
 
 
-def bind(sensor: HandMade, host: Host) -> None:
+def bind(sensor: HandMade, host: RawHost) -> None:
     sensor.send(0x645, SENSOR_ASKS)
     until(lambda: bool(sensor.received(0x345, 0x81)), "an answer to the bind request")
     sensor.beacons = True
@@ -155,8 +172,8 @@ def test_bind_and_setup(pdcpd: Pdcpd, connect: Connect, sensor: HandMade) -> Non
     assert host.system_info().devices == 0
     sensor.beacons = True
     until(lambda: host.system_info() == (1, 0, 1, 0), "one device with one output")
-    assert host.request(0x2204, b"\x01") == bytes.fromhex("34 12 78 56 BC 9A 00 11 22 33 44")
-    assert host.request(0x220A, b"\x01") == bytes.fromhex("34 12 78 56 BC 9A 01 00 50 20 21")
+    assert host.device(1) == Device(1, SENSOR, 0x2211, 0x4433)
+    assert host.output(1) == Channel(1, Direction.OUTPUT, ChannelId(SENSOR, 1), 0x5000, 0x2120)
     told = [data for identifier, data in sensor.log if identifier == 0x345 and data[0] in (3, 4)]
     gets = [tuple(data[1:]) for data in told if data[0] == 3]
     assert set(gets[:6]) == {(1, 0), (2, 0), (6, 0), (9, 0), (10, 0), (11, 0)}
@@ -170,20 +187,42 @@ def test_what_a_host_gets_from_it(pdcpd: Pdcpd, connect: Connect, sensor: HandMa
     """Bulk transfer both announced and carried out, a value, a refusal, and silence after three tries."""
     host = connect(pdcpd)
     bind(sensor, host)
-    device = Channel(SENSOR, 0)
+    device = ChannelId(SENSOR)
     sensor.bulk[(7, 0)] = b"Hand-made sensor"
     assert host.get_parameter(device, 7) == b"Hand-made sensor"
     assert (0x345, bytes.fromhex("0C 07 00")) in sensor.log
     until(lambda: sensor.received(0x345, 0x8E) == [b"\x8e\x01"] * 3, "three packets are acknowledged")
     assert host.get_parameter(device, 6) == bytes.fromhex("11 22 33 44")
-    with pytest.raises(FailureError) as refused:
+    with pytest.raises(RequestError) as refused:
         host.get_parameter(device, 0x63)
     assert refused.value.code == 0x06
     sensor.deaf_to.add((0x55, 0))
-    with pytest.raises(FailureError) as silent:
+    with pytest.raises(RequestError) as silent:
         host.get_parameter(device, 0x55)
     assert silent.value.code == 0x05
     assert sensor.log.count((0x345, bytes.fromhex("03 55 00"))) == 3
+
+
+@pytest.mark.parametrize("packets", [0, 1, 5])
+def test_a_device_dies_in_the_middle_of_a_bulk_read(
+    packets: int, pdcpd: Pdcpd, connect: Connect, sensor: HandMade
+) -> None:
+    """D-API-3: one answer all the same, error 05h or 0Ah within 3 s; and the arbitrator goes on."""
+    host = connect(pdcpd)
+    bind(sensor, host)
+    sensor.bulk[(7, 0)] = bytes(200)
+    assert host.get_parameter(ChannelId(SENSOR), 7) == bytes(200)
+    sensor.packets_left = packets
+    start_s = time.monotonic()
+    with pytest.raises(RequestError) as error:
+        host.get_parameter(ChannelId(SENSOR), 7)
+    assert time.monotonic() - start_s < 3.0
+    assert error.value.code in (ErrorCode.DEVICE_SILENT, ErrorCode.BULK_FAILED)
+    assert sensor.packets_left == -1, "it did not die in the middle"
+    until(lambda: host.system_info() == (0, 0, 0, 0), "the device is gone")
+    with pytest.raises(RequestError) as unknown:
+        host.get_parameter(ChannelId(SENSOR), 7)
+    assert unknown.value.code is ErrorCode.UNKNOWN_DEVICE
 
 
 def test_a_fifth_request_is_busy_at_once(pdcpd: Pdcpd, connect: Connect, sensor: HandMade) -> None:
@@ -191,7 +230,7 @@ def test_a_fifth_request_is_busy_at_once(pdcpd: Pdcpd, connect: Connect, sensor:
     host = connect(pdcpd)
     bind(sensor, host)
     sensor.deaf_to.add((0x55, 0))
-    get = SENSOR.pack() + bytes([0, 0x55])
+    get = bytes.fromhex("34 12 78 56 BC 9A 00 55")
     host.send_bytes(encode(0x2301, 1, get) + b"".join(encode(0x2201, reference) for reference in (2, 3, 4, 5)))
     answers = [host.receive() for _ in range(5)]
     assert [(answer.message, answer.reference) for answer in answers] == [
@@ -262,7 +301,7 @@ def test_three_beacons_missed(lives_s: float, pdcpd: Pdcpd, connect: Connect, se
     until(lambda: host.system_info().devices == 0, "the device is gone")
     assert 2.5 * BEACON_MS <= (time.monotonic() - sensor.last_sent_s) * 1000 <= 8 * BEACON_MS
     assert host.system_info() == (0, 0, 0, 0)
-    with pytest.raises(FailureError) as error:
+    with pytest.raises(RequestError) as error:
         host.device(1)
     assert error.value.code == 0x02
 
@@ -271,7 +310,7 @@ def test_a_longer_beacon_interval_is_heeded(pdcpd: Pdcpd, connect: Connect, sens
     """A host that writes parameter 10 does not make the arbitrator lose the device."""
     host = connect(pdcpd)
     bind(sensor, host)
-    host.set_parameter(Channel(SENSOR, 0), 10, bytes.fromhex("D0 07"))
+    host.set_parameter(ChannelId(SENSOR), 10, bytes.fromhex("D0 07"))
     sensor.parameters[(10, 0)] = bytes.fromhex("D0 07")
     sensor.beacons = False  # the next one would come after 2 s
     until_s = time.monotonic() + 1.7

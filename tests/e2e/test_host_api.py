@@ -8,15 +8,19 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hostapi import CONFIGURE_LINK, Answer, Channel, Host, Identity, crc8, crc16, encode
+from pdcp.wire import Frame, crc8, crc16, encode
 from programs import Pdcpd, until
+from rawhost import RawHost
+
+from pdcp import ChannelId, Identity, Link, LinkStatus
 
 D1, D2, D3 = Identity(2, 2, 4), Identity(2, 2, 5), Identity(2, 2, 6)
+D3_DESCRIPTOR = "02 00 02 00 06 00 00 07"
 SYSTEM_INFO = "FE 19 01 22 5A 23 00 00"
 SYSTEM_INFO_OF_LIMB = "FE 19 02 22 5A FB 06 00 03 04 04 00 18 0F"
 
 Start = Callable[..., Pdcpd]
-Connect = Callable[[Pdcpd], Host]
+Connect = Callable[[Pdcpd], RawHost]
 Row = tuple[str, str, str]  # what it is, request, answer
 
 # fmt: off
@@ -271,12 +275,12 @@ LINKED: list[Row] = [
 # fmt: on
 
 
-def exchange(host: Host, request: str) -> str:
+def exchange(host: RawHost, request: str) -> str:
     host.send_bytes(bytes.fromhex(request))
     return host.receive_bytes().hex(" ").upper()
 
 
-def differences(host: Host, rows: list[Row]) -> list[str]:
+def differences(host: RawHost, rows: list[Row]) -> list[str]:
     """Sends each request in turn; the rows that were answered with other bytes."""
     found = []
     for name, request, expected in rows:
@@ -287,10 +291,10 @@ def differences(host: Host, rows: list[Row]) -> list[str]:
 
 
 @pytest.fixture
-def ready(connect: Connect) -> Callable[[Pdcpd], Host]:
+def ready(connect: Connect) -> Callable[[Pdcpd], RawHost]:
     """ready(PDCPD): a host, once its three devices are set up."""
 
-    def connect_when_ready(pdcpd: Pdcpd) -> Host:
+    def connect_when_ready(pdcpd: Pdcpd) -> RawHost:
         host = connect(pdcpd)
         until(lambda: host.system_info()[:3] == (3, 4, 4), "three devices with four inputs and four outputs")
         return host
@@ -315,21 +319,21 @@ def test_messages(rows: list[Row], limb: Start, ready: Connect) -> None:
 def test_node_ids_of_link_and_outputs(limb: Start, ready: Connect) -> None:
     """The input knows the node ids of its source: device, then output; ids are unique, from 1 to 254 (D-BUS-2)."""
     host = ready(limb())
-    host.configure_link(Channel(D1, 1), Channel(D2, 2))
-    outputs = [info.channel for info in host.outputs()]
+    host.link(ChannelId(D1, 1), ChannelId(D2, 2))
+    outputs = [output.id for output in host.outputs()]
     ids = [host.get_parameter(channel, 5)[0] for channel in outputs] + [16, 32, 48]
     assert len(set(ids)) == len(ids) == 7
     assert all(1 <= each <= 254 for each in ids)
-    assert list(host.get_parameter(Channel(D2, 2), 7)) == [16, ids[outputs.index(Channel(D1, 1))]]
+    assert list(host.get_parameter(ChannelId(D2, 2), 7)) == [16, ids[outputs.index(ChannelId(D1, 1))]]
 
 
 def test_a_link_again_and_another_source(limb: Start, ready: Connect) -> None:
     """D-API-6: 2307h replaces the input's source; repeated, it succeeds."""
     host = ready(limb())
-    target = Channel(D3, 1)
-    for source in (Channel(D1, 1), Channel(D1, 1), Channel(D2, 3)):
-        assert host.configure_link(source, target) == 2
-        assert host.links() == [(source, target, 2)]
+    target = ChannelId(D3, 1)
+    for source in (ChannelId(D1, 1), ChannelId(D1, 1), ChannelId(D2, 3)):
+        assert host.link(source, target) is LinkStatus.ACTIVE
+        assert host.links() == [Link(1, source, target, LinkStatus.ACTIVE)]
 
 
 # --- framing ---
@@ -349,7 +353,7 @@ def test_lenient_takes_any_checksum(limb: Start, ready: Connect) -> None:
 def test_strict_refuses_wrong_checksums(limb: Start, ready: Connect) -> None:
     """D-API-1: error 0Ch, and the request is not carried out; an unknown id is unknown all the same."""
     host = ready(limb("--strict-crc"))
-    link = bytearray(encode(CONFIGURE_LINK, 0x5A, Channel(D1, 1).pack() + Channel(D2, 2).pack()))
+    link = bytearray.fromhex(LINKED[0][1])
     link[-1] ^= 1
     rows = [
         ("CRC8", "FE 19 01 22 5A 00 00 00", "FE 19 03 22 5A D8 03 00 0C 7C 20"),
@@ -381,7 +385,7 @@ def test_a_request_behind_rubbish_is_answered(rubbish: str, limb: Start, ready: 
     answer = host.receive()
     while answer.reference == 0x5A:
         answer = host.receive()
-    assert answer == Answer(0x2202, 0xB7, bytes([3, 4, 4, 0]))
+    assert answer == Frame(0x2202, 0xB7, bytes([3, 4, 4, 0]))
     assert exchange(host, SYSTEM_INFO) == SYSTEM_INFO_OF_LIMB
 
 
@@ -395,15 +399,15 @@ def test_a_message_may_come_in_pieces(limb: Start, ready: Connect) -> None:
 def test_four_requests_in_one_write(limb: Start, ready: Connect) -> None:
     """D-API-3: answered in order, exactly one answer each."""
     host = ready(limb())
-    descriptor = D3.pack() + bytes([0, 7])  # needs a bulk transfer first
+    descriptor = bytes.fromhex(D3_DESCRIPTOR)  # needs a bulk transfer first
     host.send_bytes(
         encode(0x2301, 1, descriptor) + encode(0x2204, 2, b"\x04") + encode(0x1234, 3) + encode(0x2301, 4, descriptor)
     )
     assert [host.receive() for _ in range(4)] == [
-        Answer(0x2302, 1, b"D3 hand"),
-        Answer(0x2206, 2, b"\x02"),
-        Answer(0x2200, 3, b""),
-        Answer(0x2302, 4, b"D3 hand"),
+        Frame(0x2302, 1, b"D3 hand"),
+        Frame(0x2206, 2, b"\x02"),
+        Frame(0x2200, 3, b""),
+        Frame(0x2302, 4, b"D3 hand"),
     ]
     assert exchange(host, SYSTEM_INFO) == SYSTEM_INFO_OF_LIMB
 
@@ -419,12 +423,12 @@ def test_host_closes_and_comes_back(limb: Start, ready: Connect, connect: Connec
     """A host that leaves in the middle leaves nothing behind for the next one."""
     pdcpd = limb()
     first = ready(pdcpd)
-    first.send_bytes(encode(0x2301, 0x11, D3.pack() + bytes([0, 7])))
+    first.send_bytes(encode(0x2301, 0x11, bytes.fromhex(D3_DESCRIPTOR)))
     first.receive_bytes()
     first.send_bytes(encode(0x2307, 0x12)[:5])
     first.close()
     for _ in range(20):
-        with Host(pdcpd.port()) as host:
+        with RawHost(pdcpd.port()) as host:
             assert host.system_info() == (3, 4, 4, 0)
     assert exchange(connect(pdcpd), SYSTEM_INFO) == SYSTEM_INFO_OF_LIMB
 
@@ -432,5 +436,5 @@ def test_host_closes_and_comes_back(limb: Start, ready: Connect, connect: Connec
 def test_host_by_a_link(limb: Start, tmp_path: Path) -> None:
     pdcpd = limb("--host", f"pty:{tmp_path / 'arbitrator'}")
     pdcpd.port()
-    with Host(str(tmp_path / "arbitrator")) as host:
+    with RawHost(str(tmp_path / "arbitrator")) as host:
         until(lambda: host.system_info()[:3] == (3, 4, 4), "the limb is set up")

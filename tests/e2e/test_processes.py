@@ -9,12 +9,17 @@ from queue import Empty
 
 import can
 import pytest
-from hostapi import LINK_ACTIVE, LINK_INACTIVE, Channel, FailureError, Host, Identity
 from programs import Pdcpd, Program, Value, until
+
+from pdcp import ChannelId, Client, Identity, LinkStatus, RequestError
 
 IDENTITIES = {"d1": Identity(2, 2, 4), "d2": Identity(2, 2, 5), "d3": Identity(2, 2, 6)}
 D1, D2, D3 = IDENTITIES.values()
-LINKS = {(Channel(D1, 1), Channel(D2, 2)), (Channel(D2, 3), Channel(D3, 1)), (Channel(D2, 5), Channel(D3, 2))}
+LINKS = {
+    (ChannelId(D1, 1), ChannelId(D2, 2)),
+    (ChannelId(D2, 3), ChannelId(D3, 1)),
+    (ChannelId(D2, 5), ChannelId(D3, 2)),
+}
 BEACON_MS = 100
 NODE_ID = 8  # parameter of a device
 
@@ -35,7 +40,7 @@ class Candump(threading.Thread):
     def run(self) -> None:
         while not self._ends:
             message = self._bus.recv(0.05)
-            # Channel data would hide everything else.
+            # ChannelId data would hide everything else.
             if message is not None and (message.arbitration_id >= 0x100 or bytes(message.data) == b"\x0a"):
                 self.lines.append(
                     f"({message.timestamp:.6f}) can0 {message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
@@ -51,7 +56,7 @@ class Candump(threading.Thread):
 class Limb:
     """pdcpd, three processes with one device each, and a host."""
 
-    def __init__(self, pdcpd: Pdcpd, files: dict[str, Path], start_node: StartNode, host: Host) -> None:
+    def __init__(self, pdcpd: Pdcpd, files: dict[str, Path], start_node: StartNode, host: Client) -> None:
         self.pdcpd = pdcpd
         self.host = host
         self._files = files
@@ -76,16 +81,16 @@ class Limb:
     def make_links(self) -> None:
         until(self.is_whole, "three devices with four inputs and four outputs")
         for output, input_ in LINKS:
-            assert self.host.configure_link(output, input_) == LINK_ACTIVE
+            assert self.host.link(output, input_) == LinkStatus.ACTIVE
 
-    def links(self) -> dict[tuple[Channel, Channel], int]:
+    def links(self) -> dict[tuple[ChannelId, ChannelId], int]:
         return {(link.output, link.input): link.status for link in self.host.links()}
 
     def is_linked(self) -> bool:
-        return self.links() == dict.fromkeys(LINKS, LINK_ACTIVE)
+        return self.links() == dict.fromkeys(LINKS, LinkStatus.ACTIVE)
 
     def names(self) -> set[Identity]:
-        return {info.channel.device for info in self.host.devices()}
+        return {device.identity for device in self.host.devices()}
 
     def arriving(self, count: int) -> list[Value]:
         """The next values at D3, without safe ones, until both inputs have had so many."""
@@ -110,7 +115,7 @@ class Limb:
 def limb(
     start: Start,
     start_node: StartNode,
-    connect: Callable[[Pdcpd], Host],
+    connect: Callable[[Pdcpd], Client],
     files: dict[str, Path],
     stack: ExitStack,
 ) -> Limb:
@@ -123,11 +128,11 @@ def limb(
 def test_values_arrive(limb: Limb) -> None:
     """The three devices, each a process, bound with the ids they ask for, linked, and the sine goes all the way."""
     limb.make_links()
-    assert [limb.host.get_parameter(Channel(each, 0), NODE_ID) for each in (D1, D2, D3)] == [b"\x10", b"\x20", b"\x30"]
+    assert [limb.host.get_parameter(ChannelId(each), NODE_ID) for each in (D1, D2, D3)] == [b"\x10", b"\x20", b"\x30"]
     assert limb.is_linked()
     values = limb.arriving(60)  # 1.2 s of 2: more than a half turn
     wrist = [value.value for value in values if value.channel == 1 and value.value is not None]
-    assert {value.device for value in values} == {"0002:0002:0006"}
+    assert {value.device for value in values} == {D3}
     assert min(wrist) >= 0 and max(wrist) <= 255 and max(wrist) - min(wrist) > 100
     assert all(abs(a - b) <= 20 for a, b in zip(wrist, wrist[1:], strict=False)), f"no sine: {wrist}"
     grip = {value.value for value in values if value.channel == 2}
@@ -140,19 +145,19 @@ def test_a_device_is_lost_and_comes_back(limb: Limb, name: str) -> None:
     limb.make_links()
     limb.arriving(3)
     lost = IDENTITIES[name]
-    old_id = limb.host.get_parameter(Channel(lost, 0), NODE_ID)
+    old_id = limb.host.get_parameter(ChannelId(lost), NODE_ID)
     limb.nodes[name].kill()
     until(lambda: limb.names() == set(IDENTITIES.values()) - {lost}, "only the other two devices are there")
-    hit = {link for link in LINKS if lost in (link[0].device, link[1].device)}
-    expected = {link: LINK_INACTIVE if link in hit else LINK_ACTIVE for link in LINKS}
+    hit = {link for link in LINKS if lost in (link[0].identity, link[1].identity)}
+    expected = {link: LinkStatus.INACTIVE if link in hit else LinkStatus.ACTIVE for link in LINKS}
     until(lambda: limb.links() == expected, f"links are {expected}", 2)
-    with pytest.raises(FailureError) as error:
-        limb.host.get_parameter(Channel(lost, 0), NODE_ID)
+    with pytest.raises(RequestError) as error:
+        limb.host.get_parameter(ChannelId(lost), NODE_ID)
     assert error.value.code == 0x03
     limb.forget_asked_id(name)
     limb.start(name)
     until(limb.is_linked, "all links are active again")
-    assert limb.host.get_parameter(Channel(lost, 0), NODE_ID) == old_id
+    assert limb.host.get_parameter(ChannelId(lost), NODE_ID) == old_id
     limb.arriving(3)
 
 
@@ -161,28 +166,28 @@ def test_a_device_restarts_before_it_is_missed(limb: Limb, name: str) -> None:
     """D-BUS-6: the identity of a bound device asks again, silence at its id says that it was reset: set up afresh."""
     limb.make_links()
     limb.arriving(3)
-    old_id = limb.host.get_parameter(Channel(IDENTITIES[name], 0), NODE_ID)
+    old_id = limb.host.get_parameter(ChannelId(IDENTITIES[name], 0), NODE_ID)
     limb.nodes[name].kill()
     limb.forget_asked_id(name)
     limb.start(name)
     until(lambda: limb.is_whole() and limb.is_linked(), "all links are active again")
     limb.arriving(3)
-    assert limb.host.get_parameter(Channel(IDENTITIES[name], 0), NODE_ID) == old_id
+    assert limb.host.get_parameter(ChannelId(IDENTITIES[name], 0), NODE_ID) == old_id
 
 
 def test_a_sensor_is_away_for_longer_than_its_ids_are_kept(limb: Limb) -> None:
     """D-BUS-6, D-BUS-14: after the 10 s the identity still gets its old id, and the input still knows its source."""
     limb.make_links()
-    old_id = limb.host.get_parameter(Channel(D1, 0), NODE_ID)
+    old_id = limb.host.get_parameter(ChannelId(D1), NODE_ID)
     limb.nodes["d1"].kill()
     until(lambda: limb.names() == {D2, D3}, "the sensor is gone")
     later_s = time.monotonic() + 10.5
     until(lambda: time.monotonic() > later_s, "10.5 s have passed", 12)
-    assert limb.links()[(Channel(D1, 1), Channel(D2, 2))] == LINK_INACTIVE
+    assert limb.links()[(ChannelId(D1, 1), ChannelId(D2, 2))] == LinkStatus.INACTIVE
     limb.forget_asked_id("d1")
     limb.start("d1")
     until(limb.is_linked, "all links are active again")
-    assert limb.host.get_parameter(Channel(D1, 0), NODE_ID) == old_id
+    assert limb.host.get_parameter(ChannelId(D1), NODE_ID) == old_id
     limb.arriving(3)
 
 
@@ -205,7 +210,7 @@ def test_hand_goes_to_its_safe_value(limb: Limb) -> None:
 
 
 def test_identities_keep_their_ids(
-    start: Start, connect: Callable[[Pdcpd], Host], files: dict[str, Path], tmp_path: Path
+    start: Start, connect: Callable[[Pdcpd], Client], files: dict[str, Path], tmp_path: Path
 ) -> None:
     """D-BUS-6: the table of identities outlives a restart; the devices ask for random ids each time."""
     nvm = tmp_path / "nvm"
@@ -217,7 +222,7 @@ def test_identities_keep_their_ids(
         pdcpd = start("--nvm", nvm, *(word for path in files.values() for word in ("--node", path)))
         host = connect(pdcpd)
         until(lambda host=host: host.system_info()[:3] == (3, 4, 4), "three devices are set up")  # type: ignore[misc]
-        found.append([host.get_parameter(Channel(each, 0), NODE_ID) for each in (D1, D2, D3)])
+        found.append([host.get_parameter(ChannelId(each), NODE_ID) for each in (D1, D2, D3)])
         until(lambda: nvm.read_bytes().count(0xFF) < nvm.stat().st_size - 20, "the table is stored")
         assert pdcpd.stop() == 0
     assert found == [found[0]] * 3

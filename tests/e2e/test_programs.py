@@ -6,11 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hostapi import Channel, Host, Identity
 from programs import Pdcpd, until
+from rawhost import RawHost
+
+from pdcp import ChannelId, Client, Identity, Link, LinkStatus
 
 Start = Callable[..., Pdcpd]
-Connect = Callable[[Pdcpd], Host]
+Connect = Callable[[Pdcpd], RawHost]
 Run = Callable[..., tuple[int, list[str]]]
 
 NVM_SIZE = 32768
@@ -164,22 +166,20 @@ def test_a_stale_link_is_replaced(start: Start, tmp_path: Path) -> None:
     assert link.is_symlink()
     path = start("--host", f"pty:{link}").port()
     assert str(link.readlink()) == path
-    with Host(str(link)) as host:
+    with Client(str(link)) as host:
         assert host.system_info() == (0, 0, 0, 0)
 
 
-def test_two_with_the_same_link(start: Start, tmp_path: Path) -> None:
-    """The link is the later one's, and the earlier one does not take it away."""
+def test_two_with_the_same_link(start: Start, run: Run, tmp_path: Path) -> None:
+    """The later one is refused, and the earlier one keeps its link."""
     link = tmp_path / "arbitrator"
     first = start("--host", f"pty:{link}")
-    first.port()
-    second = start("--host", f"pty:{link}")
-    path = second.port()
+    path = first.port()
+    assert_one_line(run("pdcpd", "--can", "sim", "--host", f"pty:{link}"), str(link), "in use")
     assert str(link.readlink()) == path
-    assert first.stop() == 0
-    with Host(str(link)) as host:
+    with Client(str(link)) as host:
         assert host.system_info() == (0, 0, 0, 0)
-    assert second.stop() == 0
+    assert first.stop() == 0
     assert not link.is_symlink()
 
 
@@ -215,12 +215,12 @@ def test_a_device_keeps_its_state(
     state = tmp_path / "d2.state"
     text = files["d2"].read_text(encoding="utf-8").replace("[device]\n", f"[device]\nstate = {state}\n")
     files["d2"].write_text(text, encoding="utf-8")
-    output, input_ = Channel(Identity(2, 2, 4), 1), Channel(Identity(2, 2, 5), 2)
+    output, input_ = ChannelId(Identity(2, 2, 4), 1), ChannelId(Identity(2, 2, 5), 2)
     pdcpd = start("--can", "sim:0")
     host = connect(pdcpd)
     nodes = [start_node(pdcpd, files[name]) for name in ("d1", "d2")]
     until(lambda: host.system_info() == (2, 2, 4, 0), "two devices are set up")
-    assert host.configure_link(output, input_) == 2
+    assert host.link(output, input_) is LinkStatus.ACTIVE
     for program in (*nodes, pdcpd):
         assert program.stop() == 0
     assert "node_id 32" in state.read_text(encoding="utf-8").splitlines()
@@ -229,7 +229,7 @@ def test_a_device_keeps_its_state(
     host = connect(pdcpd)
     for name in ("d2", "d1"):
         start_node(pdcpd, files[name])
-    until(lambda: host.links() == [(output, input_, 2)], "the link is back")
+    until(lambda: host.links() == [Link(1, output, input_, LinkStatus.ACTIVE)], "the link is back")
 
 
 def test_nothing_is_left_in_the_working_folder(programs: Path, tmp_path: Path) -> None:

@@ -49,10 +49,11 @@ static void expect_all_active(void)
 /* Values that D1 sends arrive at D3 on both its channels. */
 static void expect_flow(void)
 {
-    memset(limb.received, 0, sizeof limb.received);
+    limb_part_t *hand = &limb.parts[D3];
+    memset(hand->received, 0, sizeof hand->received);
     limb_run_ms(&limb, 1000);
-    TEST_ASSERT_GREATER_THAN(10, limb.received[1]);
-    TEST_ASSERT_GREATER_THAN(10, limb.received[2]);
+    TEST_ASSERT_GREATER_THAN(10, hand->received[1]);
+    TEST_ASSERT_GREATER_THAN(10, hand->received[2]);
 }
 
 static void test_a_limb_comes_alive(void)
@@ -85,7 +86,7 @@ static void swap(int device, uint32_t away_ms)
 {
     limb_run_ms(&limb, 200);
     link_all();
-    const uint8_t id = pdcp_device_node_id(sim_node_device(limb.nodes[device]));
+    const uint8_t id = pdcp_device_node_id(sim_node_device(limb.parts[device].node));
     limb_power_off(&limb, device);
     limb_run_ms(&limb, 1600);
     TEST_ASSERT_EQUAL(2, pdcp_nodes_count_devices(&limb.app.arb.bus.nodes));
@@ -93,7 +94,7 @@ static void swap(int device, uint32_t away_ms)
     limb_power_on(&limb, device);
     limb_run_ms(&limb, 1000);
     expect_counts(3, 4, 4, 3);
-    TEST_ASSERT_EQUAL(id, pdcp_device_node_id(sim_node_device(limb.nodes[device])));
+    TEST_ASSERT_EQUAL(id, pdcp_device_node_id(sim_node_device(limb.parts[device].node)));
     expect_all_active();
     expect_flow();
 }
@@ -142,20 +143,21 @@ static void test_a_lost_source_is_seen_at_once(void)
     const uint8_t number = 1;
     TEST_ASSERT_EQUAL_HEX16(0x220E, limb_ask(&limb, 0x220D, &number, 1));
     TEST_ASSERT_EQUAL(1, limb.answer[8 + 14]);
-    memset(limb.received, 0, sizeof limb.received);
+    limb_part_t *hand = &limb.parts[D3];
+    memset(hand->received, 0, sizeof hand->received);
     limb_run_ms(&limb, 1000);
-    TEST_ASSERT_EQUAL(0, limb.received[1]);
+    TEST_ASSERT_EQUAL(0, hand->received[1]);
 }
 
 /* The arbitrator is restarted under a living limb, with its memory: everybody binds again by himself with his
- * old id (D-BUS-15), and the links come back by Update Data Channel. */
+ * old id (D-BUS-15), and the links come back from what the devices remember. */
 static void test_the_arbitrator_is_restarted(void)
 {
     uint8_t ids[LIMB_DEVICES];
     limb_run_ms(&limb, 1000); /* the identities are stored */
     link_all();
     for (int i = 0; i < LIMB_DEVICES; i++) {
-        ids[i] = pdcp_device_node_id(sim_node_device(limb.nodes[i]));
+        ids[i] = pdcp_device_node_id(sim_node_device(limb.parts[i].node));
     }
     (void)sim_world_set_app(&limb.world, NULL);
     limb_run_ms(&limb, 300);
@@ -163,7 +165,7 @@ static void test_the_arbitrator_is_restarted(void)
     limb_run_ms(&limb, 4000);
     expect_counts(3, 4, 4, 3);
     for (int i = 0; i < LIMB_DEVICES; i++) {
-        TEST_ASSERT_EQUAL(ids[i], pdcp_device_node_id(sim_node_device(limb.nodes[i])));
+        TEST_ASSERT_EQUAL(ids[i], pdcp_device_node_id(sim_node_device(limb.parts[i].node)));
     }
     expect_all_active();
     expect_flow();
@@ -176,7 +178,7 @@ static void test_many_power_cycles(void)
     for (int round = 0; round < 60; round++) {
         random = random * 1664525u + 1013904223u;
         const int device = (int)((random >> 16) % LIMB_DEVICES);
-        if (limb.nodes[device] != NULL) {
+        if (limb.parts[device].node != NULL) {
             limb_power_off(&limb, device);
         } else {
             limb_power_on(&limb, device);
@@ -185,12 +187,12 @@ static void test_many_power_cycles(void)
         uint8_t seen[256] = {0};
         for (int i = 0; i < LIMB_DEVICES; i++) {
             const uint8_t id =
-                limb.nodes[i] != NULL ? pdcp_device_node_id(sim_node_device(limb.nodes[i])) : 0;
+                limb.parts[i].node != NULL ? pdcp_device_node_id(sim_node_device(limb.parts[i].node)) : 0;
             TEST_ASSERT_TRUE(id == 0 || seen[id]++ == 0);
         }
     }
     for (int i = 0; i < LIMB_DEVICES; i++) {
-        if (limb.nodes[i] == NULL) {
+        if (limb.parts[i].node == NULL) {
             limb_power_on(&limb, i);
         }
     }

@@ -296,6 +296,22 @@ static void test_the_stream_ends_with_its_host(void)
     TEST_ASSERT_EQUAL(0, app.api.events.mask);
 }
 
+/* What it has asked for and was not served yet is served, but for the stream. */
+static void test_no_stream_begins_when_its_host_is_gone(void)
+{
+    exchange_add_output(&x, "FE");
+    (void)exchange_drain(&x);
+    hostlink_ask(&x, 0x2301, 7, BYTES(DEV_OUT, 0, 7)); /* waits for its device */
+    hostlink_ask(&x, 0x2416, 8, BYTES(0x10));
+    arb_app_on_host_gone(&app);
+    exchange_rx(&x, "211#83 01 07 00 41");
+    hostlink_answer(0x2302, 7, BYTES(0x41));
+    hostlink_answer(0x2418, 8, BYTES(0x0B));
+    exchange_rx(&x, "02A#0A");
+    hostlink_silence();
+    TEST_ASSERT_EQUAL(0, app.api.events.mask);
+}
+
 /* --- full bus load over 128000 baud --- */
 
 #ifdef __AVR__
@@ -391,6 +407,7 @@ int main(void)
     RUN_TEST(test_no_message_is_torn_by_a_driver_that_takes_little);
     RUN_TEST(test_events_are_dropped_and_counted);
     RUN_TEST(test_the_stream_ends_with_its_host);
+    RUN_TEST(test_no_stream_begins_when_its_host_is_gone);
     RUN_TEST(test_answers_at_full_bus_load);
     return UNITY_END();
 }

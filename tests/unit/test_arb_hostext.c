@@ -304,6 +304,46 @@ static void test_a_link_is_removed(void)
     expect(0x2202, BYTES(2, 1, 1, 0));
 }
 
+/* Milliseconds with both devices alive; the application always wants to be called later, not at once. */
+static void live(uint32_t ms)
+{
+    for (uint32_t i = 0; i < ms; i++) {
+        if (x.now_ms % 400 == 0) {
+            exchange_beacons(&x);
+        }
+        exchange_wait(&x, 1);
+        (void)exchange_drain(&x);
+        arb_app_step(&app, x.now_ms);
+        TEST_ASSERT_TRUE_MESSAGE((int32_t)(app.next_ms - x.now_ms) > 0, "wants to be called at once");
+    }
+}
+
+/* Auto-save is due while the plan for a new device waits for another one's setup: it comes after the plan. */
+static void test_auto_save_waits_for_the_planner(void)
+{
+    static const exchange_pair_t third[] = {
+        {"313#81 13 0300 0300 0900", NULL}, {"313#03 01 00", "213#83 01 01 00 0300 0300"},
+        {"313#03 02 00", "213#83 01 02 00 0900"}, {"313#03 06 00", "213#83 00 06 00"},
+        {"313#03 0B 00", "213#83 00 0B 00"}, {"313#03 0A 00", "213#83 00 0A 00"},
+        {"313#03 09 00", "213#83 01 09 00 00"}, {NULL, NULL},
+    };
+    ask(0x2404, BYTES(0x04));
+    expect(0x2405, NULL, 0);
+    make_link();
+    const uint32_t made_ms = x.now_ms;
+    live(4800);
+    exchange_rx(&x, "614#01 0300 0300 0A00"); /* and does not answer */
+    (void)exchange_drain(&x);
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_pairs(&x, third);
+    TEST_ASSERT_TRUE(arb_limb_is_busy(&app.limb));
+    live(made_ms + 5100 - x.now_ms);
+    TEST_ASSERT_TRUE(arb_limb_is_busy(&app.limb));
+    TEST_ASSERT_EQUAL(0, app.limb.config.stored);
+    live(500);
+    TEST_ASSERT_EQUAL(1, app.limb.config.stored);
+}
+
 static void test_links_that_cannot_be_removed(void)
 {
     make_link();
@@ -450,6 +490,7 @@ int main(void)
     RUN_TEST(test_configurations_there_and_back);
     RUN_TEST(test_save_and_what_the_info_says);
     RUN_TEST(test_a_link_is_removed);
+    RUN_TEST(test_auto_save_waits_for_the_planner);
     RUN_TEST(test_links_that_cannot_be_removed);
     RUN_TEST(test_a_link_is_removed_from_a_silent_device);
     RUN_TEST(test_the_device_goes_while_its_link_is_removed);

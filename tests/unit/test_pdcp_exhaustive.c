@@ -141,6 +141,7 @@ static void test_on_standby_every_frame_is_classified(void)
 
 /* Brings device 11h's place into a state of its request, asked by the host. */
 static uint8_t long_value[16];
+static const uint8_t raw[8] = {PDCP_GET_PARAMETER, 7, 0};
 
 static void enter_state(pdcp_request_state_t state)
 {
@@ -166,6 +167,9 @@ static void enter_state(pdcp_request_state_t state)
             exchange_rx(&x, "211#8D 01 07 00 0A00");
         }
         break;
+    case PDCP_REQUEST_RAW:
+        pdcp_request_raw(bus, x.now_ms, 0, PDCP_CLIENT_NONE, raw, 3);
+        break;
     default:
         break;
     }
@@ -180,32 +184,33 @@ static void enter_state(pdcp_request_state_t state)
 #define GDAT PDCP_REQUEST_GET_DATA
 #define SSIZ PDCP_REQUEST_SET_SIZE
 #define SDAT PDCP_REQUEST_SET_DATA
+#define RAW PDCP_REQUEST_RAW
 
 static const struct {
     const char *event; /* a frame; NULL: the deadline of the last try */
     uint8_t next[PDCP_REQUEST_STATES];
 } machine[] = {
-    /*                              idle  answer gsize gdata ssize sdata */
-    {"211#83 01 07 00 01020304", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#83 00 07 00", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#83 02 07 00", {IDLE, GSIZ, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#83 01 08 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#84 01 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#84 02 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#88 01 0000", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#89 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#8B 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#8C 01 07 00 0A00", {IDLE, ANSW, GDAT, GDAT, SSIZ, SDAT}},
-    {"211#8C 01 07 00 0000", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT}},
-    {"211#8C 01 07 00 1100", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT}},
-    {"211#8C 00 07 00 0A00", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT}},
-    {"211#8D 01 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, SDAT, SDAT}},
-    {"211#8D 00 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, IDLE, SDAT}},
-    {"211#0E 00 010203040506", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#0E 05 010203040506", {IDLE, ANSW, GSIZ, GSIZ, SSIZ, SDAT}},
-    {"211#8E 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT}},
-    {"211#8E 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SSIZ}},
-    {NULL, {IDLE, IDLE, IDLE, GSIZ, IDLE, IDLE}},
+    /*                              idle  answer gsize gdata ssize sdata raw */
+    {"211#83 01 07 00 01020304", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT, IDLE}},
+    {"211#83 00 07 00", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT, IDLE}},
+    {"211#83 02 07 00", {IDLE, GSIZ, GSIZ, GDAT, SSIZ, SDAT, IDLE}},
+    {"211#83 01 08 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#84 01 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#84 02 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#88 01 0000", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#89 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8B 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8C 01 07 00 0A00", {IDLE, ANSW, GDAT, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8C 01 07 00 0000", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8C 01 07 00 1100", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8C 00 07 00 0A00", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8D 01 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, SDAT, SDAT, RAW}},
+    {"211#8D 00 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, IDLE, SDAT, RAW}},
+    {"211#0E 00 010203040506", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#0E 05 010203040506", {IDLE, ANSW, GSIZ, GSIZ, SSIZ, SDAT, RAW}},
+    {"211#8E 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
+    {"211#8E 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SSIZ, RAW}},
+    {NULL, {IDLE, IDLE, IDLE, GSIZ, IDLE, IDLE, IDLE}},
 };
 
 static void test_the_request_machine_over_all_states_and_events(void)

@@ -309,6 +309,107 @@ static void test_a_source_in_pieces(void)
     exchange_tx(&x, "311#04 04 01 01");
 }
 
+/* 2410h: the link is to be taken away. Whatever happens before that has its turn, it is. */
+static const exchange_pair_t removing[] = {
+    {"312#04 04 01 00", "212#84 01 04 01"},        {"312#04 07 01 0000", "212#84 01 07 01"},
+    {"312#04 08 01 0000 0000", "212#84 01 08 01"}, {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
+    {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"}, {NULL, NULL},
+};
+
+static void expect_no_link(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.nodes.channels[input()].link);
+    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, x.arb->bus.nodes.channels[input()].todo);
+    TEST_ASSERT_TRUE(pdcp_arb_links_settled(x.arb));
+}
+
+static void test_a_removal_outlasts_a_link_that_fails(void)
+{
+    static const exchange_pair_t third[] = {
+        {"313#81 13 0300 0300 0900", NULL},
+        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
+        {"313#03 02 00", "213#83 01 02 00 0900"},
+        {"313#03 06 00", "213#83 00 06 00"},
+        {"313#03 0B 00", "213#83 00 0B 00"},
+        {"313#03 0A 00", "213#83 00 0A 00"},
+        {"313#03 09 00", "213#83 01 09 00 01"},
+        {"313#04 04 01 00", "213#84 01 04 01 00"},
+        {"313#03 03 01", "213#83 01 03 01 02"},
+        {"313#03 01 01", "213#83 01 01 01 0050 2021"},
+        {"313#03 09 01", "213#83 00 09 01"},
+        {"313#03 0A 01", "213#83 00 0A 01"},
+        {"313#04 05 01 FD", "213#84 01 05 01 FD"},
+        {NULL, NULL},
+    };
+    make_link();
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_run(&x, third);
+    TEST_ASSERT_EQUAL(PDCP_OK,
+                      pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1), input()));
+    exchange_tx(&x, "312#04 04 01 00");
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    exchange_rx(&x, "212#84 00 04 01"); /* refused: the link that worked would be made anew */
+    exchange_tx(&x, "311#04 04 01 00");
+    exchange_rx(&x, "211#84 01 04 01");
+    exchange_run(&x, removing);
+    expect_no_link();
+}
+
+static void test_a_removal_outlasts_an_absent_source(void)
+{
+    make_link();
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 01 05 01 0300 0300");
+    exchange_tx(&x, "312#03 06 01");
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    exchange_rx(&x, "212#83 01 06 01 0900 01"); /* to be silenced */
+    exchange_tx(&x, "311#04 04 01 00");         /* by identifier */
+    exchange_tx(&x, "312#8F 00 01");
+    exchange_rx(&x, "211#84 01 04 01");
+    exchange_run(&x, removing);
+    expect_no_link();
+}
+
+static void test_a_removal_outlasts_the_source(void)
+{
+    make_link();
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    exchange_rx(&x, "611#01 0200 0200 0400"); /* the source's device was reset */
+    exchange_tx(&x, "311#03 01 00");
+    exchange_pass(&x, 99);
+    exchange_rx(&x, "212#83 01 05 01 0200 0200");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_pass(&x, 1); /* it is lost: the input would be silenced */
+    (void)exchange_drain(&x);
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_tx(&x, "312#8F 00 01");
+    exchange_pairs(&x, removing);
+    expect_no_link();
+}
+
+static void test_a_removal_outlasts_an_update(void)
+{
+    make_link();
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    exchange_rx(&x, "212#0F 01"); /* it asks again */
+    exchange_rx(&x, "212#83 01 05 01 0200 0200");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_tx(&x, "312#8F 01 01");
+    exchange_tx(&x, "312#04 04 01 00");
+    exchange_rx(&x, "212#84 01 04 01");
+    exchange_pairs(&x, &removing[1]);
+    exchange_tx(&x, "311#04 04 01 00");
+    exchange_rx(&x, "211#84 01 04 01");
+    exchange_silence(&x);
+    expect_no_link();
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -326,5 +427,9 @@ int main(void)
     RUN_TEST(test_a_device_that_was_left_is_tried_again);
     RUN_TEST(test_a_number_in_pieces);
     RUN_TEST(test_a_source_in_pieces);
+    RUN_TEST(test_a_removal_outlasts_a_link_that_fails);
+    RUN_TEST(test_a_removal_outlasts_an_absent_source);
+    RUN_TEST(test_a_removal_outlasts_the_source);
+    RUN_TEST(test_a_removal_outlasts_an_update);
     return UNITY_END();
 }

@@ -251,6 +251,23 @@ static void test_a_bus_that_was_well_for_long_starts_from_100_ms(void)
     TEST_ASSERT_EQUAL(PDCP_BUS_ACTIVE, exchange_last(&x, PDCP_EVENT_STATE)->status);
 }
 
+/* The end of a standby, where all that is known of the bus is forgotten, is no reason to stay off it. */
+static void test_bus_off_is_left_over_the_end_of_a_standby(void)
+{
+    exchange_rx(&x, "100#0A");
+    exchange_wait(&x, 2200);
+    pdcp_arb_on_state(x.arb, x.now_ms, PDCP_BUS_OFF);
+    exchange_wait(&x, 50);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_STARTED));
+    TEST_ASSERT_FALSE(pdcp_arb_take_restart(x.arb));
+    exchange_wait(&x, 49);
+    TEST_ASSERT_FALSE(pdcp_arb_take_restart(x.arb));
+    exchange_wait(&x, 1);
+    TEST_ASSERT_TRUE(pdcp_arb_take_restart(x.arb));
+    exchange_wait(&x, 10000);
+    TEST_ASSERT_FALSE(pdcp_arb_take_restart(x.arb));
+}
+
 /* A queue full of low priority never keeps a beacon or a link change out, and they leave first; what is
  * pushed out is counted. */
 static void test_a_full_queue_delays_nothing_urgent(void)
@@ -284,6 +301,7 @@ int main(void)
     RUN_TEST(test_a_link_that_was_not_answered_is_tried_again);
     RUN_TEST(test_bus_off_is_left_with_a_growing_pause);
     RUN_TEST(test_a_bus_that_was_well_for_long_starts_from_100_ms);
+    RUN_TEST(test_bus_off_is_left_over_the_end_of_a_standby);
     RUN_TEST(test_a_full_queue_delays_nothing_urgent);
     return UNITY_END();
 }

@@ -17,8 +17,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import NamedTuple, Self
 
-from hostapi import LINK_ACTIVE, Channel, Host, Identity
 from programs import Pdcpd, Program, until
+
+from pdcp import ChannelId, Client, Identity, LinkStatus
 
 ROOT = Path(__file__).resolve().parents[2]
 INTERFACE = "vcan0"
@@ -27,7 +28,11 @@ LOG_LINES = 150
 
 D1, D2, D3 = (Identity(2, 2, serial) for serial in (4, 5, 6))
 DEVICES = {"d1": D1, "d2": D2, "d3": D3}
-LINKS = {(Channel(D1, 1), Channel(D2, 2)), (Channel(D2, 3), Channel(D3, 1)), (Channel(D2, 5), Channel(D3, 2))}
+LINKS = {
+    (ChannelId(D1, 1), ChannelId(D2, 2)),
+    (ChannelId(D2, 3), ChannelId(D3, 1)),
+    (ChannelId(D2, 5), ChannelId(D3, 2)),
+}
 PARAMETER_NODE_ID = 8  # of a device
 PARAMETER_OUTPUT_ID = 5  # of an output channel
 
@@ -177,11 +182,11 @@ class Bench:
         self._started.append(self._stack.enter_context(program))
         return program
 
-    def pdcpd(self, *arguments: str | Path) -> Pdcpd:
+    def pdcpd(self, *arguments: str | Path, autoconfig: bool = False) -> Pdcpd:
         """pdcpd on vcan0 that makes no links unasked; its host's port is the link "host" in the test's folder."""
         port = f"pty:{self.folder / 'host'}"
-        words = ["--can", f"socketcan:{INTERFACE}", "--host", port, "--no-autoconfig", "--log", "info", *arguments]
-        pdcpd = Pdcpd(self.programs, *words)
+        words = ["--can", f"socketcan:{INTERFACE}", "--host", port, "--log", "info", *arguments]
+        pdcpd = Pdcpd(self.programs, *words, *([] if autoconfig else ["--no-autoconfig"]))
         self._started_one(pdcpd)
         pdcpd.port()
         return pdcpd
@@ -197,9 +202,9 @@ class Bench:
     def player(self) -> Player:
         return self._stack.enter_context(Player())
 
-    def host(self) -> Host:
+    def host(self) -> Client:
         """A host at the link that the last pdcpd made."""
-        return self._stack.enter_context(Host(str(self.folder / "host"), timeout_s=DEADLINE_S))
+        return self._stack.enter_context(Client(str(self.folder / "host"), timeout_s=DEADLINE_S))
 
     def description(self, name: str, rate_ms: int | None = None) -> Path:
         """A device of tools/demo.d; rate_ms replaces the rate of a sensor."""
@@ -224,8 +229,10 @@ class Bench:
 class Limb:
     """Acceptance system 2: pdcpd, three processes with one device each, and a host."""
 
-    def __init__(self, bench: Bench, *pdcpd_arguments: str | Path, sensor_rate_ms: int | None = None) -> None:
-        self.pdcpd = bench.pdcpd(*pdcpd_arguments)
+    def __init__(
+        self, bench: Bench, *pdcpd_arguments: str | Path, sensor_rate_ms: int | None = None, autoconfig: bool = False
+    ) -> None:
+        self.pdcpd = bench.pdcpd(*pdcpd_arguments, autoconfig=autoconfig)
         rates = {"d1": sensor_rate_ms}
         self.nodes = {name: bench.node("--stats", bench.description(name, rates.get(name))) for name in DEVICES}
         self.host = bench.host()
@@ -233,19 +240,19 @@ class Limb:
     def link(self) -> None:
         until(lambda: self.host.system_info()[:3] == (3, 4, 4), "3 devices, 4 inputs, 4 outputs", DEADLINE_S)
         for output, input_ in sorted(LINKS):
-            assert self.host.configure_link(output, input_) == LINK_ACTIVE, f"{output} to {input_}"
+            assert self.host.link(output, input_) == LinkStatus.ACTIVE, f"{output} to {input_}"
 
-    def links(self) -> dict[tuple[Channel, Channel], int]:
+    def links(self) -> dict[tuple[ChannelId, ChannelId], int]:
         return {(link.output, link.input): link.status for link in self.host.links()}
 
     def is_linked(self) -> bool:
-        return self.host.system_info()[:3] == (3, 4, 4) and self.links() == dict.fromkeys(LINKS, LINK_ACTIVE)
+        return self.host.system_info()[:3] == (3, 4, 4) and self.links() == dict.fromkeys(LINKS, LinkStatus.ACTIVE)
 
     def node_ids(self) -> list[int]:
-        return [self.host.get_parameter(Channel(each, 0), PARAMETER_NODE_ID)[0] for each in DEVICES.values()]
+        return [self.host.get_parameter(ChannelId(each), PARAMETER_NODE_ID)[0] for each in DEVICES.values()]
 
     def output_id(self, device: Identity, channel: int) -> int:
-        return self.host.get_parameter(Channel(device, channel), PARAMETER_OUTPUT_ID)[0]
+        return self.host.get_parameter(ChannelId(device, channel), PARAMETER_OUTPUT_ID)[0]
 
     def pids(self) -> dict[str, int]:
         return {"pdcpd": self.pdcpd.process.pid} | {name: node.process.pid for name, node in self.nodes.items()}

@@ -8,13 +8,14 @@ Expected frames are written from the specification (pdcp-bus.md 1 to 3), byte by
 
 import json
 import re
+import struct
 import time
 from contextlib import suppress
 from typing import NamedTuple
 
-from hostapi import Channel, Identity
 from programs import Program, until
 
+from pdcp import Channel, ChannelId, Device, Direction, Identity
 from tests.vm.bench import (
     D1,
     D2,
@@ -95,6 +96,11 @@ def assert_whole(limb: Limb, candump: Candump, outputs: Outputs) -> str:
     return f"D1 sent {len(sent)} values; {len(received[1])} arrived at D3 channel 1, {len(received[2])} at channel 2"
 
 
+def identity_hex(device: Identity) -> str:
+    """VID, PID and SN as they stand in a frame."""
+    return struct.pack("<HHH", device.vid, device.pid, device.sn).hex().upper()
+
+
 def limb_of_four_processes_agrees_with_candump(bench: Bench) -> None:
     """Three devices bind, are linked over the host port, and D1's values arrive at both inputs of D3."""
     candump = bench.candump()
@@ -103,7 +109,7 @@ def limb_of_four_processes_agrees_with_candump(bench: Bench) -> None:
     outputs = outputs_of(limb)
     until(lambda: len(data_of(candump, outputs.wrist)) >= 100, "100 values from D2", DEADLINE_S)
     for (name, device), node_id in zip(DEVICES.items(), limb.node_ids(), strict=True):
-        identity = device.pack().hex().upper()
+        identity = identity_hex(device)
         asked = f"6{node_id:02X}#01{identity}"
         assert asked in candump.texts(), f"no bind request {asked} of {name}"
         candump.await_frame(f"3{node_id:02X}#81{node_id:02X}{identity}", candump.texts().index(asked))
@@ -247,8 +253,8 @@ def device_by_hand_is_set_up(bench: Bench) -> None:
     assert host.system_info().devices == 0, "a device counts from its first beacon (D-API-6)"
     cansend("011#0A")
     until(lambda: host.system_info() == (1, 0, 1, 0), "the host sees one device and one output", DEADLINE_S)
-    assert host.devices() == [(Channel(BY_HAND, 0), 0, 0)]
-    assert host.outputs() == [(Channel(BY_HAND, 1), 0x5000, 0x2120)]
+    assert host.devices() == [Device(1, BY_HAND, 0, 0)]
+    assert host.outputs() == [Channel(1, Direction.OUTPUT, ChannelId(BY_HAND, 1), 0x5000, 0x2120)]
     another_of_its_name(candump, player)
 
 
@@ -384,7 +390,7 @@ def foreign_frames_do_not_wake_a_device(bench: Bench) -> None:
     node = bench.node("--stats", bench.description("d1"), bench.description("d3"))
     pid = node.process.pid
     for device in (D1, D3):
-        candump.await_frame(rf"6..#01{device.pack().hex()}".upper())
+        candump.await_frame(rf"6..#01{identity_hex(device)}")
     until(lambda: is_asleep(pid), "pdcp-node sleeps", DEADLINE_S)
     candump.stop()
 

@@ -229,6 +229,7 @@ void arb_hostapi_on_frame(arb_hostapi_t *api, const arb_port_t *port, uint32_t n
 void arb_hostapi_on_host_gone(arb_hostapi_t *api)
 {
     arb_hostevents_end(&api->events);
+    arb_hostrx_clear(&api->rx);
     for (uint8_t i = 0; i < api->held_count; i++) {
         if (api->held[i].id == ARB_MSG_EVENT_STREAM) {
             api->held[i].error = ARB_ERR_NOT_READY; /* it would be the next host's */

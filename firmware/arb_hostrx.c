@@ -50,6 +50,13 @@ void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte)
     }
 }
 
+void arb_hostrx_clear(arb_hostrx_t *rx)
+{
+    drop_taken(rx);
+    rx->garbage += rx->len;
+    rx->len = 0;
+}
+
 static bool crc8_matches(const arb_hostrx_t *rx, const arb_host_header_t *header)
 {
     return header->crc8 == arb_host_crc8(rx->bytes);

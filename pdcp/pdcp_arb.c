@@ -829,7 +829,7 @@ void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pd
 
 bool pdcp_arb_links_settled(const pdcp_arb_t *arb)
 {
-    return pdcp_link_is_settled(&arb->link);
+    return pdcp_link_is_settled(&arb->link, &arb->bus);
 }
 
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)

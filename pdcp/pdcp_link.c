@@ -155,11 +155,6 @@ static void deactivate(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint
     pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
 }
 
-bool pdcp_link_is_settled(const pdcp_link_t *link)
-{
-    return !link->active && !link->due && link->wish_input == PDCP_NONE;
-}
-
 void pdcp_link_rest(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t input)
 {
     deactivate(link, bus, now_ms, input, false);
@@ -317,6 +312,7 @@ static void begin(pdcp_link_t *link, pdcp_todo_t kind, uint8_t input, uint8_t ou
     link->undoing = kind != PDCP_TODO_CONNECT && kind != PDCP_TODO_UPDATE;
     link->once = false;
     link->for_host = false;
+    link->again = false;
     link->output_was_on = false;
     link->status = PDCP_OK;
 }
@@ -634,6 +630,7 @@ static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
     case PDCP_TODO_SILENCE:
     case PDCP_TODO_AGAIN:
         start_silence(link, bus, number);
+        link->again = todo == PDCP_TODO_AGAIN;
         break;
     case PDCP_TODO_REMOVE:
         begin(link, todo, number, PDCP_NONE, STEP_INPUT_ON);
@@ -699,8 +696,42 @@ static uint8_t next_todo(const pdcp_bus_t *bus)
     return best;
 }
 
+/* Is there something to be done, other than to silence again? */
+static bool has_work(const pdcp_link_t *link, const pdcp_bus_t *bus)
+{
+    const uint8_t next = link->due ? next_todo(bus) : (uint8_t)PDCP_NONE;
+    return link->wish_input != PDCP_NONE ||
+           (next != PDCP_NONE && bus->nodes.channels[next].todo != PDCP_TODO_AGAIN);
+}
+
+bool pdcp_link_is_settled(const pdcp_link_t *link, const pdcp_bus_t *bus)
+{
+    return (!link->active || link->again) && !has_work(link, bus);
+}
+
+/* Who waits for the device's place is served when a request of it ends, so that none may be broken off. */
+static bool is_waited_for(const pdcp_bus_t *bus, uint8_t node)
+{
+    return node != PDCP_NONE && (bus->nodes.nodes[node].asked_again || bus->nodes.nodes[node].reset_asked);
+}
+
+/* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. */
+static void break_off(pdcp_link_t *link, pdcp_bus_t *bus)
+{
+    if (link->at != PDCP_NONE) {
+        pdcp_request_cancel(bus, link->at);
+        link->at = PDCP_NONE;
+    }
+    link->active = false;
+    silence_again(link, channel_of(bus, link->input));
+    silence_again(link, channel_of(bus, link->output));
+}
+
 void pdcp_link_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
 {
+    if (link->active && link->again && has_work(link, bus) && !is_waited_for(bus, link->at)) {
+        break_off(link, bus);
+    }
     if (link->active && link->waiting) {
         run(link, bus, now_ms);
     }

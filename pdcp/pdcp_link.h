@@ -18,6 +18,7 @@ typedef struct {
     bool undoing;       /* steps run backwards */
     bool once;          /* the device that failed is tried once only */
     bool for_host;      /* the host waits for the outcome */
+    bool again;         /* it repeats a silencing that was not answered: whatever comes interrupts it */
     uint8_t at;         /* place of the device whose answer the job waits for, PDCP_NONE: of none */
     uint8_t kind;       /* pdcp_todo_t of the job */
     uint8_t step;       /* pdcp_link.c */
@@ -41,8 +42,8 @@ typedef struct {
 /* Nothing is under way; planned stays as it is. */
 void pdcp_link_init(pdcp_link_t *link);
 
-/* Is there neither a job nor anything to do? */
-bool pdcp_link_is_settled(const pdcp_link_t *link);
+/* Is there neither a job nor anything to do, but to silence again what does not answer? */
+bool pdcp_link_is_settled(const pdcp_link_t *link, const pdcp_bus_t *bus);
 
 /* Lets an active link rest: both ends disabled, source remembered (D-PRO-9). */
 void pdcp_link_rest(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t input);

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pdcp.busload import BusLoad
 from pdcp.frames import BASE_ID_MAX, EXTENDED_ID_MAX, Frame
@@ -105,13 +105,11 @@ FRAMES = st.one_of(
 )  # fmt: skip
 
 
-@settings(deadline=None, max_examples=500)
 @given(FRAMES)
 def test_stuff_bits_are_exact(frame: Frame) -> None:
     assert frame_bits(frame) == slow_bits(frame)
 
 
-@settings(deadline=None)
 @given(st.builds(Frame, st.just(0), st.integers(0, BASE_ID_MAX), st.binary(min_size=8, max_size=8)))
 def test_eight_bytes_take_108_to_132_bits(frame: Frame) -> None:
     assert 108 <= frame_bits(frame) <= 132

@@ -4,7 +4,7 @@ import io
 
 import can
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pdcp.candump import format_frame, parse_line, read_log
 from pdcp.frames import BASE_ID_MAX, EXTENDED_ID_MAX, FD_SIZES, Frame, FrameError
@@ -112,13 +112,11 @@ FRAMES = st.one_of(
 )  # fmt: skip
 
 
-@settings(deadline=None)
 @given(FRAMES)
 def test_frames_survive_their_line(frame: Frame) -> None:
     assert parse_line(format_frame(frame)) == frame
 
 
-@settings(deadline=None)
 @given(st.one_of(st.text(), st.from_regex(r"\(\d+\.\d*\) can0 [0-9A-F]*#.*")))
 def test_any_line_is_read_or_rejected(line: str) -> None:
     try:
@@ -127,7 +125,6 @@ def test_any_line_is_read_or_rejected(line: str) -> None:
         assert str(error)
 
 
-@settings(deadline=None)
 @given(st.builds(Frame, st.integers(0, 2**40), BASE_IDS, DATA, direction=st.sampled_from(("R", "T"))))
 def test_python_can_reads_what_is_written(frame: Frame) -> None:
     (message,) = can.CanutilsLogReader(io.StringIO(format_frame(frame) + "\n"))

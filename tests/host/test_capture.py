@@ -9,7 +9,7 @@ from pathlib import Path
 
 import can
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pdcp.candump import format_frame
 from pdcp.capture import from_message, open_bus, open_frames, play, read_bus, read_capture, to_message
@@ -160,7 +160,6 @@ def test_frames_before_and_behind_a_bad_packet_are_kept() -> None:
 STARTS = (b"", section(), section() + interface(), pcap(), section(">") + interface(order=">"))
 
 
-@settings(deadline=None)
 @given(
     st.sampled_from(STARTS), st.one_of(st.binary(max_size=200), st.binary(max_size=60).map(lambda body: block(6, body)))
 )
@@ -186,7 +185,6 @@ MESSAGES = st.builds(
 )
 
 
-@settings(deadline=None)
 @given(MESSAGES)
 def test_frames_go_through_python_can(frame: Frame) -> None:
     message = to_message(frame)

@@ -96,8 +96,8 @@ def test_dump_of_a_log(pdcp: Pdcp, log: Path) -> None:
     assert pdcp("dump", log) == (
         0,
         "    0.000000  100  BA > all   Device Beacon\n"
-        "    0.010000  611  11h > BA   Bind Device Request: requested=11h vid=0002h pid=0002h serial=0004h\n"
-        "    0.010000  311  BA > 11h   Bind Device Response: node=11h (granted) vid=0002h pid=0002h serial=0004h\n"
+        "    0.010000  611  11h > BA   Bind Device Request: requested=11h identity=2:2:4\n"
+        "    0.010000  311  BA > 11h   Bind Device Response: node=11h (granted) identity=2:2:4\n"
         "    0.030000  011  11h > BA   Device Beacon\n",
         "",
     )
@@ -117,7 +117,7 @@ def test_dump_as_json_lines(pdcp: Pdcp, log: Path, place: str) -> None:
     assert status == 0 and [each["meaning"] for each in objects] == [
         "Device Beacon", "Bind Device Request", "Bind Device Response", "Device Beacon",
     ]  # fmt: skip
-    assert objects[2]["fields"] == {"node": 0x11, "vid": 2, "pid": 2, "serial": 4}
+    assert objects[2]["fields"] == {"node": 0x11, "identity": "2:2:4"}
 
 
 def test_dump_of_standard_input(pdcp: Pdcp, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -179,11 +179,11 @@ def test_a_bus_that_is_not_there_is_exit_3(pdcp: Pdcp, words: list[str]) -> None
 TABLE = """\
 Bus load at 1 Mbit/s
 
- sender          frames  bits  mean %  peak %
- ────────────────────────────────────────────
- arbitrator           2   178    0.18    0.18
- 0002:0002:0004       2   169    0.17    0.17
- all                  4   347    0.35    0.35
+ sender      frames  bits  mean %  peak %
+ ────────────────────────────────────────
+ arbitrator       2   178    0.18    0.18
+ 2:2:4            2   169    0.17    0.17
+ all              4   347    0.35    0.35
 
 """
 
@@ -199,12 +199,12 @@ def test_busload_as_json(pdcp: Pdcp, log: Path) -> None:
     status, out, _ = pdcp("busload", log, "--interval", "0.02", "--windows", "--json")
     data = json.loads(out)
     assert status == 0
-    assert [row["sender"] for row in data["senders"]] == ["arbitrator", "0002:0002:0004"]
+    assert [row["sender"] for row in data["senders"]] == ["arbitrator", "2:2:4"]
     assert [window["start"] for window in data["windows"]] == [0.0, 0.02]
     assert [window["bits"] for window in data["windows"]] == [290, 57]
     assert data["windows"][0]["load"] == data["total"]["peak"] == pytest.approx(290 / 20_000)
     assert data["total"]["mean"] == pytest.approx(347 / 40_000)
-    assert data["windows"][0]["senders"] == pytest.approx({"arbitrator": 178 / 20_000, "0002:0002:0004": 112 / 20_000})
+    assert data["windows"][0]["senders"] == pytest.approx({"arbitrator": 178 / 20_000, "2:2:4": 112 / 20_000})
     assert data["uncounted"] == 0
 
 

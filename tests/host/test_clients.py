@@ -212,6 +212,14 @@ def test_a_device_that_refuses_to_be_suspended(run: Run, arbitrator: Make) -> No
     assert error.value.code is ErrorCode.DEVICE_REFUSED
 
 
+@pytest.mark.parametrize("time_ms", [-1, 65536])
+def test_a_time_that_no_message_can_carry(run: Run, arbitrator: Make, time_ms: int) -> None:
+    peer = arbitrator(lambda _: [])
+    with pytest.raises(messages.FormatError, match=f"{time_ms} ms"):
+        run(peer.port, lambda c: c.suspend(HAND, time_ms))
+    assert peer.requests == []
+
+
 def test_reset_names_those_that_were_not(run: Run, arbitrator: Make) -> None:
     rows = {
         (0x2204, b"\x01"): (0x2205, SENSOR_BYTES + bytes(5)),
@@ -479,9 +487,7 @@ def test_waiting_for_events_ends_with_the_line(arbitrator: Make) -> None:
 
 def test_tasks_share_the_line(arbitrator: Make) -> None:
     """Twenty requests at once, four of them under way; each gets its own answer."""
-    peer = arbitrator(
-        lambda frame: [Frame(0x2205, frame.reference, SENSOR_BYTES + b"\0" + frame.payload + b"\0\0\0")]
-    )
+    peer = arbitrator(lambda frame: [Frame(0x2205, frame.reference, SENSOR_BYTES + b"\0" + frame.payload + b"\0\0\0")])
 
     async def ask() -> list[Device]:
         async with AsyncClient(peer.port) as client:

@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from pdcp.profiles import describe_type, parse_profile, profile_name, profile_path, profiles
 
@@ -61,7 +61,7 @@ def test_every_node_is_well_formed() -> None:
         parts = components(word)
         used = [part for part in parts if part]
         assert parts == used + [0] * (4 - len(used))  # zeros only at the end
-        assert all(part % 2 == 0 for part in used[1:])  # odd ones are for vendors
+        assert all(part % 2 == 0 for part in used[1:])  # odd ones are for vendors (D-PRO-22)
         assert len(used) == 1 or int("".join(f"{part:X}" for part in used[:-1]).ljust(4, "0"), 16) in tree
         assert all(getattr(node, key) for key in COLUMNS)
 
@@ -105,7 +105,6 @@ def test_name_of_a_word(word: int, name: str | None) -> None:
     assert profile_name(word) == name
 
 
-@settings(deadline=None)
 @given(WORDS)
 def test_a_name_is_that_of_the_nearest_ancestor(word: int) -> None:
     ancestors = [word & mask for mask in (0xFFFF, 0xFFF0, 0xFF00, 0xF000) if word & mask in profiles()]
@@ -159,7 +158,6 @@ def test_type_in_words(word: int, text: str) -> None:
     assert describe_type(word) == text
 
 
-@settings(deadline=None)
 @given(WORDS)
 def test_any_word_is_a_type(word: int) -> None:
     assert describe_type(word)

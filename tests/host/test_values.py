@@ -70,6 +70,7 @@ VALUES = [
     (Kind.DEVICE, "serial-number", "04 01", "260", {"sn": 260}),
     (Kind.DEVICE, "ean13-low", "01 00 00 80", "2147483649", {"ean13_low": 0x80000001}),
     (Kind.DEVICE, "version", "02 01 03 00", "firmware 258, hardware 3", {"firmware": 258, "hardware": 3}),
+    (Kind.DEVICE, "version", "FF FF FF FF", "firmware 65535, hardware 65535", {"firmware": 0xFFFF, "hardware": 0xFFFF}),
     (Kind.DEVICE, "type", "22 11 44 33", "type 1122h, profile 3344h", {"type": 0x1122, "profile": 0x3344}),
     (Kind.DEVICE, "descriptor", "44 31 C3 A4", "D1ä", "D1ä"),
     (Kind.DEVICE, "descriptor", "1B 5B 32 4A FF", "\ufffd[2J\ufffd", "\x1b[2J\ufffd"),
@@ -91,6 +92,7 @@ VALUES = [
     (Kind.OUTPUT, "transfer-type", "07", "7", {"transfer_type": 7}),
     (Kind.OUTPUT, "enabled", "01", "on", {"enabled": True}),
     (Kind.OUTPUT, "enabled", "00", "off", {"enabled": False}),
+    (Kind.OUTPUT, "enabled", "02", "2", {"enabled": 2}),
     # D-BUS-7
     (Kind.INPUT, "source-device", "FF FF FF FF", "none", {"vid": 0xFFFF, "pid": 0xFFFF}),
     (Kind.INPUT, "source-channel", "FF FF FF", "none", {"sn": 0xFFFF, "index": 0xFF}),

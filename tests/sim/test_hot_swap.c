@@ -209,8 +209,8 @@ static void test_the_order_of_arrival_does_not_matter(void)
 
 /* --- A part that refuses --- */
 
-/* Parameter 5 of input 2 cannot be written: what was made for this link is undone, the next candidate is
- * tried. */
+/* D-PRO-14: Parameter 5 of input 2 cannot be written: what was made for this link is undone, the next
+ * candidate is tried. */
 static void test_a_refused_link_leads_to_the_next_candidate(void)
 {
     const int bad = limb_add_with(&limb, 2, CONTROLLER, "[parameter 5 2]\n");
@@ -421,6 +421,36 @@ static void test_another_configuration_is_loaded(void)
     TEST_ASSERT_EQUAL(1, limb.app.limb.active);
 }
 
+/* D-PRO-15: the host sees what is missing. */
+static void test_a_link_without_its_source_is_listed(void)
+{
+    static const uint8_t missing[] = {2, 0, 2, 0, 4, 0, 1, 2, 0, 2, 0, 5, 0, 2, PDCP_LINK_INACTIVE};
+    run_limb();
+    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
+    for (int i = D1; i <= D3; i++) {
+        limb_power_off(&limb, i);
+        limb_blank(&limb, i);
+    }
+    restart(D2, D3);
+    limb_run_ms(&limb, 3000);
+    bool listed = false;
+    for (uint8_t number = 1; limb_ask(&limb, 0x220D, &number, 1) == 0x220E; number++) {
+        listed = listed || memcmp(missing, &limb.answer[8], sizeof missing) == 0;
+    }
+    TEST_ASSERT_TRUE(listed);
+}
+
+/* D-PRO-18: the arbitrator has power long before the parts are there. */
+static void test_the_start_up_waits_for_a_part(void)
+{
+    limb_run_ms(&limb, 3000);
+    TEST_ASSERT_EQUAL(PROFILE_WAITING, limb.app.limb.run.state);
+    limb_want(&limb, LINKS);
+    limb_plug(&limb, D1, D3);
+    limb_await(&limb, 1000);
+    TEST_ASSERT_GREATER_OR_EQUAL(500000, limb.linked.time_us - limb.ready.time_us);
+}
+
 static void test_a_configuration_is_erased(void)
 {
     run_limb();
@@ -428,7 +458,10 @@ static void test_a_configuration_is_erased(void)
     (void)limb_act(&limb, ARB_ACTION_ERASE, 1);
     TEST_ASSERT_EQUAL(0, limb.app.limb.active);
     TEST_ASSERT_EQUAL(0, limb.app.limb.config.stored);
-    limb_expect(&limb, LINKS); /* what works goes on */
+    limb_expect(&limb, LINKS);                        /* what works goes on */
+    const uint8_t load_none[] = {ARB_ACTION_LOAD, 0}; /* D-PRO-16 */
+    TEST_ASSERT_EQUAL_HEX16(0x2409, limb_ask(&limb, 0x2407, load_none, sizeof load_none));
+    TEST_ASSERT_EQUAL_HEX8(0x02, limb.answer[8]);
     const uint8_t load[] = {ARB_ACTION_LOAD, 1};
     TEST_ASSERT_EQUAL_HEX16(0x2409, limb_ask(&limb, 0x2407, load, sizeof load));
     TEST_ASSERT_EQUAL_HEX8(0x02, limb.answer[8]);
@@ -481,7 +514,7 @@ static void remember_both(void)
     }
 }
 
-/* Only one of them may have it, by its serial number; there is nothing left to be enforced. */
+/* D-PRO-19: Only one of them may have it, by its serial number; there is nothing left to be enforced. */
 static void test_two_that_remember_the_same_source(void)
 {
     remember_both();
@@ -754,6 +787,10 @@ static void test_32_devices_with_4_channels_each(void)
                  (double)(limb.linked.time_us - limb.ready.time_us) / 1000.0,
                  (double)(limb.linked.busy_us - limb.ready.busy_us) / 1000.0);
     limb_expect_flow(&limb);
+    const uint8_t save[] = {ARB_ACTION_SAVE, 0}; /* D-PRO-11: more links than a configuration holds */
+    TEST_ASSERT_EQUAL_HEX16(0x2409, limb_ask(&limb, 0x2407, save, sizeof save));
+    TEST_ASSERT_EQUAL_HEX8(0x0D, limb.answer[8]);
+    TEST_ASSERT_EQUAL(0, limb.app.limb.config.stored);
     limb_want(&limb, text);
     limb_pull(&limb, 0, 3);
     limb_run_ms(&limb, 3000);
@@ -780,6 +817,8 @@ int main(void)
     RUN_TEST(test_a_device_that_stays_away_after_a_reset_is_replaced_after_3_s);
     RUN_TEST(test_a_standby_takes_the_limb_over);
     RUN_TEST(test_another_configuration_is_loaded);
+    RUN_TEST(test_a_link_without_its_source_is_listed);
+    RUN_TEST(test_the_start_up_waits_for_a_part);
     RUN_TEST(test_a_configuration_is_erased);
     RUN_TEST(test_all_links_are_removed);
     RUN_TEST(test_two_that_remember_the_same_source);

@@ -227,6 +227,7 @@ static void test_system_3_hot_swap_hand(void)
     pull_and_plug(D3, D3, "hot swap, D3");
 }
 
+/* D-PRO-12: they are planned together, not as they come. */
 static void test_system_3_hot_swap_all(void)
 {
     pull_and_plug(D1, D3, "hot swap, all parts at once");

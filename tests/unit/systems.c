@@ -343,14 +343,15 @@ void systems_planned(const systems_t *s, char text[SYSTEMS_TEXT])
 {
     int used = 0;
     text[0] = '\0';
-    for (unsigned at = 0; at < SYSTEMS_NAMES * 256u; at++) {
-        for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+    for (uint8_t n = 0; n < SYSTEMS_NAMES; n++) {
+        const uint8_t place = pdcp_nodes_find(&s->nodes, &s->named[n]);
+        uint8_t i = place != PDCP_NONE ? s->nodes.nodes[place].first_channel : PDCP_NONE;
+        for (; i != PDCP_NONE; i = s->nodes.channels[i].next) {
             const uint8_t output = s->plan.want[i];
-            if (output != PDCP_NONE && s->nodes.channels[i].index == at % 256u &&
-                name_of(s, i) == at / 256u) {
+            if (output != PDCP_NONE) {
                 used += snprintf(&text[used], (size_t)(SYSTEMS_TEXT - used), "%s%u.%u>%u.%u",
-                                 used == 0 ? "" : " ", name_of(s, output), s->nodes.channels[output].index,
-                                 name_of(s, i), s->nodes.channels[i].index);
+                                 used == 0 ? "" : " ", name_of(s, output), s->nodes.channels[output].index, n,
+                                 s->nodes.channels[i].index);
                 TEST_ASSERT_LESS_THAN(SYSTEMS_TEXT, used);
             }
         }

@@ -185,6 +185,7 @@ static void expect_string(const uint8_t *wanted, uint16_t len)
         6, 5, 6, 0, 0, 7, 0x00, 0x50, 8, 0x20, 0x21, 9, 1, 0, 10, 2, 0, 11, 2, 0, 12, 4, 0, 13, 0, 0, 14, 0, \
         0
 
+/* D-API-15. */
 static void test_an_empty_memory_reads_as_a_string_without_configurations(void)
 {
     EXPECT(1, 0, 0, 15, 0, 0);
@@ -600,7 +601,7 @@ static void test_a_memory_that_hangs_ends_the_job(void)
     TEST_ASSERT_EQUAL(0, writes);
 }
 
-/* The copy rots while the arbitrator runs: it is not used, and above all not copied under a good CRC. */
+/* D-PRO-21: The copy rots while the arbitrator runs: it is not used, and above all not copied under a good CRC. */
 static void test_damage_at_run_time_is_noticed(void)
 {
     (void)save(1, 1, 0x5300);

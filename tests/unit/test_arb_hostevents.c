@@ -283,7 +283,7 @@ static void test_events_are_dropped_and_counted(void)
     hostlink_silence();
 }
 
-/* A host that has gone takes its stream with it: the next one has asked for nothing. */
+/* D-API-14: A host that has gone takes its stream with it: the next one has asked for nothing. */
 static void test_the_stream_ends_with_its_host(void)
 {
     subscribe(0x10);
@@ -310,6 +310,21 @@ static void test_no_stream_begins_when_its_host_is_gone(void)
     exchange_rx(&x, "02A#0A");
     hostlink_silence();
     TEST_ASSERT_EQUAL(0, app.api.events.mask);
+}
+
+/* Nor by what stood in the middle of something when it went. */
+static void test_what_was_begun_ends_with_its_host(void)
+{
+    hostlink_send(&x, "FE 19 04 23 00 00 40 00 02 00"); /* 54 bytes are missing */
+    hostlink_ask(&x, 0x2416, 8, BYTES(0x10));
+    const uint32_t garbage = app.api.rx.garbage;
+    arb_app_on_host_gone(&app);
+    TEST_ASSERT_EQUAL(garbage + 21, app.api.rx.garbage);
+    exchange_pass(&x, 200);
+    hostlink_silence();
+    TEST_ASSERT_EQUAL(0, app.api.events.mask);
+    hostlink_ask(&x, 0x2201, 9, NULL, 0);
+    hostlink_answer(0x2202, 9, BYTES(0, 0, 0, 0));
 }
 
 /* --- full bus load over 128000 baud --- */
@@ -408,6 +423,7 @@ int main(void)
     RUN_TEST(test_events_are_dropped_and_counted);
     RUN_TEST(test_the_stream_ends_with_its_host);
     RUN_TEST(test_no_stream_begins_when_its_host_is_gone);
+    RUN_TEST(test_what_was_begun_ends_with_its_host);
     RUN_TEST(test_answers_at_full_bus_load);
     return UNITY_END();
 }

@@ -129,6 +129,7 @@ static void test_the_strict_flag_is_in_force_at_once(void)
 
 /* --- 2407h --- */
 
+/* D-API-13. */
 static void test_actions_that_cannot_be(void)
 {
     exchange_pass(&x, 600);

@@ -374,6 +374,7 @@ static void expect_chain(uint8_t length, bool linked)
     TEST_ASSERT_EQUAL_UINT8(linked ? length : 0, count_links());
 }
 
+/* D-PRO-17. */
 static void test_a_chain_is_followed_to_its_depth(void)
 {
     expect_chain(PROFILE_PLAN_DEPTH - 1, true);
@@ -507,6 +508,50 @@ static void test_an_original_does_not_take_what_it_needs(void)
     expect("1.1>2.1 3.1>2.2");
 }
 
+/* 2.2 requires 2.1, which has the source that 5.1 had: a working original is not given up for another one. */
+static void test_an_original_does_not_cost_another_one(void)
+{
+    run("D1 out 1 5000 2110; D2 in 1 5200 2110, in 2 5200 1110 req 1; D3 out 1 5000 1110; D4 out 1 5000 2120;"
+        "D5 in 1 5200 2200",
+        "4.1>2.1 3.1>2.2 1.1>5.1");
+    lose(5);
+    lose(4);
+    expect("1.1>2.1 3.1>2.2");
+    back(5);
+    expect("1.1>2.1 3.1>2.2");
+    back(4);
+    expect("4.1>2.1 3.1>2.2 1.1>5.1");
+}
+
+/* A control is replaced by another one: what its outputs require is connected with them, and stands in as
+ * well. */
+static void test_what_a_replacement_requires_stands_in_too(void)
+{
+    systems_add(&s, systems_acceptance(2));
+    expect(as_2);
+    lose(2);
+    systems_add(&s,
+                "D5 2:2:9 in 1 7200 2200, in 2 5200 2110, out 3 5000 1100 req 2, out 4 5000 1210 req 1,"
+                "out 5 7000 1220 req 2");
+    expect("5.3>3.1 5.5>3.2 1.1>5.2");
+    back(2);
+    expect(as_2);
+}
+
+/* 2.2 is found by autoconfiguration only after 2.1 has lost what its source requires; but it is like the
+ * missing 5.1, so it is 2.1 that has the output in the end. */
+static void test_a_stand_in_that_was_found_by_chance_gives_way_at_once(void)
+{
+    set_up(
+        "D1 out 1 5000 1110 req 2, in 2 5100 2110; D2 in 1 5200 1200, in 2 5300 1110; D3 out 1 5000 3110;"
+        "D4 out 1 5000 2110; D5 in 1 5300 1110",
+        "3.1>1.2 1.1>2.1 1.1>5.1");
+    lose(5);
+    expect("3.1>1.2 1.1>2.1");
+    lose(3);
+    expect("4.1>1.2 1.1>2.1");
+}
+
 /* What stands in for 3.1 is required by what the original requires. */
 static void test_an_original_does_not_pull_away_what_it_needs(void)
 {
@@ -543,6 +588,31 @@ static void test_a_required_input_is_connected_by_the_configuration(void)
     set_up(parts, "4.1>1.2");
     expect("4.1>1.2 1.1>2.1");
     expect_of(parts, "3.1>1.2 1.1>2.1");
+}
+
+/* 4.1 could not be linked before: it requires an input itself, for which a search is due. */
+static void test_a_required_input_has_its_original_with_all_that_it_needs(void)
+{
+    set_up(
+        "D1 out 1 5000 1110 req 2, in 2 5200 2110; D2 in 1 5300 1110; D3 out 1 5000 2110;"
+        "D4 out 1 5000 2200 req 2, in 2 5200 2120; D5 out 1 5000 2120",
+        "4.1>1.2");
+    expect("4.1>1.2 1.1>2.1 5.1>4.2");
+}
+
+/* Listing 4.3: what is not terminal is just connected, and rests while it lacks something. */
+static void test_nothing_is_searched_for_an_original_that_is_not_terminal(void)
+{
+    set_up("D1 out 1 5000 2110 req 2, in 2 5200 2110; D2 in 1 5200 2110; D3 out 1 5000 2110", "1.1>2.1");
+    expect("");
+    systems_configure(&s, "3.1>1.2", false);
+    expect("3.1>1.2 1.1>2.1");
+}
+
+static void test_originals_that_are_not_terminal_come_first(void)
+{
+    set_up("D1 out 1 5000 2110; D2 in 1 5300 1110, in 2 5200 1200", "1.1>2.1 1.1>2.2");
+    expect("1.1>2.2");
 }
 
 /* 3.1 is more like the input, 5.1 more like the missing source. */
@@ -601,6 +671,7 @@ static void test_replacements_are_made_in_order_of_similarity(void)
     expect("5.1>3.1");
 }
 
+/* D-PRO-10. */
 static void test_a_replacement_is_most_like_the_missing_channel(void)
 {
     run("D1 out 1 5000 2110; D2 in 1 5200 2200; D3 out 1 5000 2200, out 2 5000 2120", "1.1>2.1");
@@ -619,29 +690,66 @@ static void test_an_input_that_is_configured_itself_does_not_stand_in(void)
     expect("4.1>3.1");
 }
 
+static void await(uint8_t name)
+{
+    const uint8_t place = systems_place(&s, name);
+    lose(name);
+    s.awaited[place / 8] = (uint8_t)(1u << (place % 8));
+}
+
 static void test_awaited_devices_are_not_replaced(void)
 {
     run("D1 out 1 5000 2110; D2 in 1 5300 2110; D3 out 1 5000 2120; D4 in 1 5200 2110", "1.1>2.1");
-    const uint8_t place = systems_place(&s, 1);
-    lose(1);
-    s.awaited[place / 8] = (uint8_t)(1u << (place % 8));
+    await(1);
     expect("");
     back(1);
     expect("1.1>2.1");
     lose(1);
-    s.awaited[place / 8] = 0;
+    memset(s.awaited, 0, sizeof s.awaited);
     expect("3.1>2.1");
 }
 
 static void test_an_awaited_input_is_not_replaced(void)
 {
     run("D1 out 1 5000 2110; D2 in 1 5200 2110; D4 in 1 5200 2110", "1.1>2.1");
-    const uint8_t place = systems_place(&s, 2);
-    lose(2);
-    s.awaited[place / 8] = (uint8_t)(1u << (place % 8));
+    await(2);
     expect("");
-    s.awaited[place / 8] = 0;
+    memset(s.awaited, 0, sizeof s.awaited);
     expect("1.1>4.1");
+}
+
+/* D-PRO-13. */
+static void test_an_awaited_source_is_not_replaced_for_what_requires_it(void)
+{
+    set_up(
+        "D1 out 1 5000 1110 req 2, in 2 5200 2110; D2 in 1 5300 1110; D3 out 1 5000 2110; D4 out 1 5000 2120",
+        "3.1>1.2");
+    await(3);
+    expect("");
+    back(3);
+    expect("3.1>1.2 1.1>2.1");
+}
+
+static void test_an_input_that_waits_for_its_source_does_not_stand_in(void)
+{
+    run("D1 out 1 5000 2110; D2 in 1 5200 2110; D3 in 1 5200 2110; D4 out 1 5000 2110", "1.1>2.1 4.1>3.1");
+    lose(2);
+    await(4);
+    expect("");
+    memset(s.awaited, 0, sizeof s.awaited);
+    expect("1.1>3.1");
+}
+
+/* Its own source is gone for good, but the limb is not whole for another reason: it may become so. */
+static void test_a_configured_terminal_channel_is_not_autoconfigured_while_a_device_is_awaited(void)
+{
+    run("D1 out 1 5000 2110; D2 in 1 5300 1110; D3 out 1 5000 1200; D4 out 1 5000 2120; D5 in 1 5200 2110",
+        "1.1>2.1 4.1>5.1");
+    forget(1);
+    await(4);
+    expect("");
+    back(4);
+    expect("3.1>2.1 4.1>5.1");
 }
 
 static void test_a_device_that_is_being_set_up_is_awaited(void)
@@ -858,9 +966,15 @@ int main(void)
     RUN_TEST(test_an_original_that_cannot_hold_replaces_nothing);
     RUN_TEST(test_an_original_that_cannot_hold_is_in_nobodys_way);
     RUN_TEST(test_an_original_does_not_take_what_it_needs);
+    RUN_TEST(test_an_original_does_not_cost_another_one);
+    RUN_TEST(test_what_a_replacement_requires_stands_in_too);
+    RUN_TEST(test_a_stand_in_that_was_found_by_chance_gives_way_at_once);
     RUN_TEST(test_an_original_does_not_pull_away_what_it_needs);
     RUN_TEST(test_a_stand_in_that_is_wanted_elsewhere_is_replaced_at_once);
     RUN_TEST(test_a_required_input_is_connected_by_the_configuration);
+    RUN_TEST(test_a_required_input_has_its_original_with_all_that_it_needs);
+    RUN_TEST(test_nothing_is_searched_for_an_original_that_is_not_terminal);
+    RUN_TEST(test_originals_that_are_not_terminal_come_first);
     RUN_TEST(test_a_missing_source_is_replaced_by_likeness_to_it);
     RUN_TEST(test_links_rest_while_what_they_require_is_missing);
     RUN_TEST(test_links_by_the_host_are_left_alone);
@@ -870,6 +984,9 @@ int main(void)
     RUN_TEST(test_an_input_that_is_configured_itself_does_not_stand_in);
     RUN_TEST(test_awaited_devices_are_not_replaced);
     RUN_TEST(test_an_awaited_input_is_not_replaced);
+    RUN_TEST(test_an_awaited_source_is_not_replaced_for_what_requires_it);
+    RUN_TEST(test_an_input_that_waits_for_its_source_does_not_stand_in);
+    RUN_TEST(test_a_configured_terminal_channel_is_not_autoconfigured_while_a_device_is_awaited);
     RUN_TEST(test_a_device_that_is_being_set_up_is_awaited);
     RUN_TEST(test_only_what_is_asked_for_is_planned);
     RUN_TEST(test_enforce_keeps_the_lowest_profile);

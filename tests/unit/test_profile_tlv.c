@@ -218,6 +218,7 @@ static void test_counts_must_match(void)
     CHECK(PROFILE_TLV_ERR_COUNT, 1, 2, 0, 2, 1, 0, 3, 1, 0, 4, 1, 0, 2, 2, 0, 4, 1, 0, 15, 0, 0);
 }
 
+/* D-PRO-20. */
 static void test_nothing_is_given_twice(void)
 {
     CHECK(PROFILE_TLV_ERR_TWICE, 1, 2, 0, 2, 7, 0, 2, 7, 0);

@@ -167,7 +167,7 @@ def check_errors_and_bus_off(bench: Bench, adapter: Adapter, limb: Limb) -> None
 
 
 def check_unplugs(bench: Bench, adapter: Adapter, limb: Limb) -> None:
-    """D-LIN-1: pulled out and plugged in ten times: the daemon waits without much work, comes back, and the limb goes on."""
+    """D-LIN-1: pulled out and plugged in ten times, the daemon waits without much work and comes back."""
     times: list[float] = []
     for i in range(UNPLUGS):
         adapter.unplug()

@@ -7,28 +7,28 @@ raw.
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 from .frames import Frame
-from .values import (
-    DIRECTIONS,
-    INPUT,
+from .functions import FUNCTIONS, Function, Values, code_class, sizes_text, split, word_at
+from .model import ChannelId, Identity
+from .parameters import (
     NO_CHANNEL,
-    ONLY_INPUTS,
-    OUTPUT,
-    Field,
-    channel_value,
-    count_text,
-    ms_text,
-    node_text,
-    parameter_of,
-    profile_text,
-    raw_text,
-    value_fields,
-    word_at,
+    TRANSFER_KINDS,
+    TRANSFER_TYPE,
+    Form,
+    Kind,
+    Parameter,
+    Style,
+    by_number,
+    channels_of,
+    show_profile,
 )
+from .profiles import channel_value
 
-__all__ = ["Decoded", "Decoder", "format_line", "to_json"]
+__all__ = ["Decoded", "Decoder", "Field", "format_line", "to_json"]
 
 _BINDING = 3
 _NODE_MAX = 254
@@ -41,6 +41,22 @@ _BROADCASTS = (0x08, 0x09, 0x0A, 0x0B)
 _BEACON = 0x0A
 _ANSWERED = (0x03, 0x04, 0x08, 0x09, 0x0B, 0x0C, 0x0D, 0x0F)
 _DEPRECATED = (0x02, 0x05, 0x06, 0x07, 0x82, 0x85, 0x86, 0x87)
+
+# Parameters of channels that the decoder learns from.
+_TYPE, _SOURCE_CHANNEL, _SOURCE_NODES = 1, 6, 7
+_NODE_ID = 5  # of an output; of an input it is the source's device
+_ONLY_INPUTS = (6, 7, 8, 11)
+
+Json: TypeAlias = "bool | int | str | list[int] | None"
+
+
+@dataclass(frozen=True, slots=True)
+class Field:
+    """One field of a frame: its value for machines, and as people read it."""
+
+    name: str
+    value: Json
+    text: str
 
 
 @dataclass(slots=True)
@@ -55,7 +71,7 @@ class Decoded:
     fields: list[Field] = field(default_factory=list)
     problem: str = ""
     notes: list[str] = field(default_factory=list)
-    device: str = ""  # identity of the device that sends or is addressed, if it is known
+    device: Identity | None = None  # that sends or is addressed, if it is known
 
     @property
     def priority(self) -> int:
@@ -70,83 +86,57 @@ class Decoded:
         return self.frame.can_id & 0xFF
 
 
-# --- wire layout ----------------------------------------------------------------------------------
+# --- fields ---------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, slots=True)
-class _Function:
-    name: str
-    sizes: tuple[int, ...]
-    layout: tuple[tuple[str, int], ...] = ()  # name and bytes; 0: all that is left
-    device: bool = False  # a device may send it
-    arbitrator: bool = False
+def _node_text(node: int) -> str:
+    return f"{node:02X}h"
 
 
-_IDENTITY = (("vid", 2), ("pid", 2), ("serial", 2))
-_PARAMETER = (("parameter", 1), ("channel", 1))
-_RESPONSE = (("response", 1),)
-_VALUE = (("value", 0),)
-_REST = (("rest", 0),)  # of the deprecated codes only the sizes are known
-_SIZE = (("size", 2),)
+def _count_text(size: int) -> str:
+    return f"{size} byte" if size == 1 else f"{size} bytes"
 
 
-def _range(low: int, high: int) -> tuple[int, ...]:
-    return tuple(range(low, high + 1))
+def _raw_field(name: str, data: bytes) -> Field:
+    return Field(name, data.hex().upper(), data.hex().upper() or "(empty)")
 
 
-# The sizes of [PDCP 3.2]; one that only [PDCP 3.1] has stands behind (D-BUS-3).
-_FUNCTIONS = {
-    0x01: _Function("Bind Device Request", (7,), _IDENTITY, device=True),
-    0x02: _Function("GetDeviceInfo", (2,), _REST, arbitrator=True),
-    0x03: _Function("Get Device Parameter", (3,), _PARAMETER, arbitrator=True),
-    0x04: _Function("Set Device Parameter", _range(4, 7), _PARAMETER + _VALUE, arbitrator=True),
-    0x05: _Function("IndGetDeviceParameter", (4,), _REST, device=True),
-    0x06: _Function("IndSetDeviceParameter", _range(5, 8), _REST, device=True),
-    0x07: _Function("SetNodeId", (2,), _REST, arbitrator=True),
-    0x08: _Function("Suspend Device", (3,), (("time", 2),), arbitrator=True),
-    0x09: _Function("Release Device", (1,), arbitrator=True),
-    0x0A: _Function("Device Beacon", (1,), device=True, arbitrator=True),
-    0x0B: _Function("Reset Device", (1,), arbitrator=True),
-    0x0C: _Function("Configure Get Bulk Data Transfer", (3, 5), _PARAMETER + _SIZE, arbitrator=True),
-    0x0D: _Function("Configure Set Bulk Data Transfer", (5,), _PARAMETER + _SIZE, arbitrator=True),
-    0x0E: _Function("Bulk Data Transfer", _range(3, 8), (("packet", 1), ("data", 0)), device=True, arbitrator=True),
-    0x0F: _Function("Update Data Channel", (2,), (("channel", 1),), device=True),
-    0x81: _Function("Bind Device Response", (8,), (("node", 1), *_IDENTITY), arbitrator=True),
-    0x82: _Function("GetDeviceInfo Response", _range(2, 6), _REST, device=True),
-    0x83: _Function("Get Device Parameter Response", _range(4, 8), _RESPONSE + _PARAMETER + _VALUE, device=True),
-    0x84: _Function("Set Device Parameter Response", (5, 6, 7, 8, 4), _RESPONSE + _PARAMETER + _VALUE, device=True),
-    0x85: _Function("IndGetDeviceParameter Response", _range(4, 7), _REST, arbitrator=True),
-    0x86: _Function("IndSetDeviceParameter Response", (1,), arbitrator=True),
-    0x87: _Function("SetNodeId Response", (1,), device=True),
-    0x88: _Function("Suspend Device Response", (4, 1), _RESPONSE + (("time", 2),), device=True),
-    0x89: _Function("Release Device Response", (2, 1), _RESPONSE, device=True),
-    0x8B: _Function("Reset Device Response", (2, 1), _RESPONSE, device=True),
-    0x8C: _Function("Configure Get Bulk Data Transfer Response", (6,), _RESPONSE + _PARAMETER + _SIZE, device=True),
-    0x8D: _Function("Configure Set Bulk Data Transfer Response", (6,), _RESPONSE + _PARAMETER + _SIZE, device=True),
-    0x8E: _Function("Bulk Data Transfer Response", (2,), _RESPONSE, device=True, arbitrator=True),
-    0x8F: _Function("Update Data Channel Response", (3,), _RESPONSE + (("channel", 1),), arbitrator=True),
-}
+def _parameter_of(channel: int, number: int, kind: Kind | None) -> Parameter | None:
+    """None: the specification has none, or which one it is depends on the channel's kind, which is not known."""
+    if channel == 0:
+        return by_number(Kind.DEVICE, number)
+    if kind is None and number == _NODE_ID:
+        return None
+    return by_number(kind or Kind.INPUT, number)  # all others are the same of both, or an input's alone
 
 
-def _code_class(code: int) -> str:
-    """What a code without a function of its own is [PDCP 3.1]."""
-    for low, high, name in (
-        (0x10, 0x4F, "Reserved System Code"),
-        (0x50, 0x7F, "Device-Specific Code"),
-        (0x90, 0xCF, "Reserved System Response"),
-        (0xD0, 0xFE, "Device-Specific Response"),
-    ):
-        if low <= code <= high:
-            return name
-    return "Unknown Code"
+def _text_field(name: str, data: bytes) -> Field:
+    """In quotes, without control characters."""
+    try:
+        text = data.decode("utf-8")
+    except UnicodeDecodeError:
+        return Field(name, None, f"{data.hex().upper()} (no UTF-8)")
+    return Field(name, text, json.dumps(text, ensure_ascii=not text.isprintable()))
 
 
-def _sizes_text(sizes: tuple[int, ...]) -> str:
-    ordered = sorted(sizes)
-    if len(ordered) > 2 and ordered == list(range(ordered[0], ordered[-1] + 1)):
-        return f"{ordered[0]} to {ordered[-1]} bytes"
-    text = " or ".join(str(size) for size in ordered)
-    return f"{text} byte" if ordered == [1] else f"{text} bytes"
+def _value_fields(parameter: Parameter | None, data: bytes) -> list[Field]:
+    """The fields of a value, each with the name that it has in `get`; bytes that are missing or too many are told."""
+    if parameter is None:
+        return [_raw_field("value", data)]
+    if parameter.form is Form.TEXT:
+        return [_text_field(parameter.name, data)]
+    if parameter.form is Form.CHANNELS:
+        return [Field(parameter.name, channels_of(data), parameter.show(data))]
+    fields = []
+    for part, number in zip(parameter.fields, parameter.numbers(data), strict=True):
+        text = _node_text(number) if part.style is Style.NODE else part.show(number)
+        fields.append(Field(part.name, part.decode(number), "none" if parameter.is_no_source(data) else text))
+    size = parameter.size or 0
+    if len(data) < size:
+        fields.append(Field("bytes_missing", size - len(data), str(size - len(data))))
+    if len(data) > size:
+        fields.append(_raw_field("bytes_extra", data[size:]))
+    return fields
 
 
 # --- what is known --------------------------------------------------------------------------------
@@ -154,7 +144,7 @@ def _sizes_text(sizes: tuple[int, ...]) -> str:
 
 @dataclass(slots=True)
 class _Channel:
-    direction: int = 0
+    kind: Kind | None = None  # input or output
     type: int = -1
     profile: int = 0
     source_channel: int = 0
@@ -175,8 +165,8 @@ class _Transfer:
 
 @dataclass(slots=True)
 class _Device:
-    identity: str = ""
-    vid_pid: str = ""
+    identity: Identity | None = None
+    vid_pid: tuple[int, int] | None = None
     channels: dict[int, _Channel] = field(default_factory=dict)
     written: dict[tuple[int, int], bytes] = field(default_factory=dict)  # channel, parameter: not answered yet
     asked: set[tuple[int, int, int]] = field(default_factory=set)  # code, parameter, channel: not answered yet
@@ -185,21 +175,15 @@ class _Device:
     def channel(self, index: int) -> _Channel:
         return self.channels.setdefault(index, _Channel())
 
-    def direction(self, index: int) -> int:
+    def kind(self, index: int) -> Kind | None:
         known = self.channels.get(index)
-        return known.direction if known else 0
+        return known.kind if known else None
 
 
 @dataclass(frozen=True, slots=True)
 class _Output:
     node: int  # of its device
     index: int  # 0: not known
-
-
-class _Values(dict[str, int]):
-    """The numbers of a message by name, and the bytes at its end."""
-
-    tail: bytes = b""
 
 
 class Decoder:
@@ -212,33 +196,29 @@ class Decoder:
     # --- for others ---
 
     def sender(self, frame: Frame) -> str:
-        """Who sent a frame, as far as is known by now: `arbitrator`, `0002:0002:0004`, `0002:0002:0004 channel 1`,
-        `node 11h`, or `other frames` for what PDCP does not use."""
+        """Who sent a frame, as far as is known by now: `arbitrator`, `2:2:4`, `2:2:4.1` for its channel, `node 11h`,
+        or `other frames` for what PDCP does not use."""
         if not frame.is_base:
             return "other frames"
         if frame.can_id & 0x100:
             return "arbitrator"
         node = frame.can_id & 0xFF
         if frame.can_id >> 9 == _BINDING:
-            vid, pid, serial = (word_at(frame.data, at) for at in (1, 3, 5))
-            return f"{vid:04X}:{pid:04X}:{serial:04X}"
+            is_request = frame.data[:1] == b"\x01" and len(frame.data) in FUNCTIONS[0x01].sizes
+            return str(_identity(split(FUNCTIONS[0x01], frame.data))) if is_request else f"node {_node_text(node)}"
         output = self._outputs.get(node)
-        if output is not None:
-            return self._output_text(node, output)
-        device = self._devices.get(node)
-        return device.identity if device and device.identity else f"node {node_text(node)}"
+        return self._device_text(node) if output is None else self._output_text(node, output)
 
     def decode(self, frame: Frame) -> Decoded:
         """What a frame says. Learns from it."""
         if not frame.is_base:
             decoded = Decoded(frame, _OTHER_KINDS[frame.kind], problem="PDCP uses base data frames alone")
-            decoded.fields = self._raw_fields(frame)
+            decoded.fields = [_raw_field("data", frame.data)]
             return decoded
         decoded = Decoded(frame, "")
         node = decoded.node
         decoded.route = self._route(decoded)
-        known = self._devices.get(node)
-        decoded.device = known.identity if known else ""
+        decoded.device = self._identity_of(node)
         if decoded.priority == _BINDING:
             self._binding(decoded)
         elif decoded.from_arbitrator:
@@ -254,38 +234,42 @@ class Decoder:
     # --- sorts of frames ---
 
     def _route(self, decoded: Decoded) -> str:
-        node = node_text(decoded.node)
+        node = _node_text(decoded.node)
         if decoded.from_arbitrator:
             return f"BA > {node if decoded.node else 'all'}"
         return f"{node} > *" if decoded.node in self._outputs and decoded.priority != _BINDING else f"{node} > BA"
 
-    @staticmethod
-    def _raw_fields(frame: Frame) -> list[Field]:
-        return [Field("data", frame.data.hex().upper(), raw_text(frame.data))]
+    def _identity_of(self, node: int) -> Identity | None:
+        device = self._devices.get(node)
+        return device.identity if device else None
+
+    def _device_text(self, node: int) -> str:
+        return str(self._identity_of(node) or f"node {_node_text(node)}")
 
     def _binding(self, decoded: Decoded) -> None:
         """Priority 3: bind requests alone."""
         frame = decoded.frame
         if decoded.from_arbitrator:
             decoded.meaning, decoded.problem = "Binding Frame", "priority 3 with mode 1 is not used"
-            decoded.fields = self._raw_fields(frame)
+            decoded.fields = [_raw_field("data", frame.data)]
         elif frame.data[:1] != b"\x01":
             decoded.meaning, decoded.problem = "Binding Frame", "priority 3 is for Bind Device Request alone"
-            decoded.fields = self._raw_fields(frame)
+            decoded.fields = [_raw_field("data", frame.data)]
         else:
             self._message(decoded)
-            decoded.fields.insert(0, Field("requested", decoded.node, node_text(decoded.node)))
-            decoded.device = self.sender(frame) if not decoded.problem else ""
+            decoded.fields.insert(0, Field("requested", decoded.node, _node_text(decoded.node)))
+            if not decoded.problem:
+                decoded.device = _identity(split(FUNCTIONS[0x01], frame.data))
 
     def _stranger(self, decoded: Decoded) -> None:
         """An id that nothing is known of: a message if it can be one, else perhaps channel data."""
         code = decoded.frame.data[0] if decoded.frame.data else -1
-        function = _FUNCTIONS.get(code)
+        function = FUNCTIONS.get(code)
         if function is not None and function.device and len(decoded.frame.data) in function.sizes:
             self._message(decoded)
         else:
             decoded.meaning = "Channel Data or unknown"
-            decoded.fields = self._raw_fields(decoded.frame)
+            decoded.fields = [_raw_field("data", decoded.frame.data)]
         if decoded.node not in (0, _UNUSED_NODE):
             decoded.notes.append("unknown id")
         else:
@@ -297,18 +281,22 @@ class Decoder:
         device = self._devices.get(output.node)
         channel = device.channels.get(output.index) if device else None
         decoded.meaning = "Channel Data"
-        decoded.device = device.identity if device else ""
+        decoded.device = device.identity if device else None
         text = self._output_text(node, output)
         decoded.fields = [Field("output", text, text)]
         if channel is not None and channel.type >= 0:
-            decoded.fields.append(Field("profile", channel.profile, profile_text(channel.profile)))
-            decoded.fields += channel_value(channel.type, data)
-        decoded.fields += self._raw_fields(decoded.frame)
+            decoded.fields.append(Field("profile", channel.profile, show_profile(channel.profile)))
+            value = channel_value(channel.type, data)
+            if value is not None:
+                decoded.fields.append(Field("value", value, str(value).lower()))
+        decoded.fields.append(_raw_field("data", decoded.frame.data))
 
     def _output_text(self, node: int, output: _Output) -> str:
-        device = self._devices.get(output.node)
-        who = device.identity if device and device.identity else f"node {node_text(output.node)}"
-        return f"{who} channel {output.index}" if output.index else f"{who} output {node_text(node)}"
+        identity = self._identity_of(output.node)
+        if identity and output.index:
+            return str(ChannelId(identity, output.index))
+        which = f"channel {output.index}" if output.index else f"output {_node_text(node)}"
+        return f"{self._device_text(output.node)} {which}"
 
     # --- messages ---
 
@@ -318,27 +306,27 @@ class Decoder:
             decoded.meaning, decoded.problem = "Empty Frame", "there is no function code"
             return
         decoded.code = data[0]
-        function = _FUNCTIONS.get(data[0])
+        function = FUNCTIONS.get(data[0])
         if function is None:
-            name = _code_class(data[0])
+            name = code_class(data[0])
             decoded.meaning = f"{name} {data[0]:02X}h"
             if name == "Unknown Code":
                 decoded.problem = "the protocol has no such code"
-            decoded.fields = [Field("rest", data[1:].hex().upper(), raw_text(data[1:]))]
+            decoded.fields = [_raw_field("rest", data[1:])]
             self._check_place(decoded)
             return
         decoded.meaning = function.name
         if len(data) not in function.sizes:
-            decoded.problem = f"must have {_sizes_text(function.sizes)}, has {len(data)}"
-            decoded.fields = [Field("rest", data[1:].hex().upper(), raw_text(data[1:]))]
+            decoded.problem = f"must have {sizes_text(function.sizes)}, has {len(data)}"
+            decoded.fields = [_raw_field("rest", data[1:])]
             return
         self._fields(decoded, function)
         self._check_place(decoded)
         if not decoded.problem:
             self._follow(decoded)
 
-    def _fields(self, decoded: Decoded, function: _Function) -> None:
-        values = _split(function, decoded.frame.data)
+    def _fields(self, decoded: Decoded, function: Function) -> None:
+        values = split(function, decoded.frame.data)
         if decoded.code in _DEPRECATED:
             decoded.notes.append("deprecated")
         if "response" in dict(function.layout):
@@ -347,61 +335,58 @@ class Decoder:
             if name in values:
                 decoded.fields.append(_plain_field(decoded, name, values[name]))
         if "vid" in values:
-            vid, pid, serial = (values[name] for name in ("vid", "pid", "serial"))
-            decoded.fields += [Field(n, v, f"{v:04X}h") for n, v in (("vid", vid), ("pid", pid), ("serial", serial))]
+            identity = str(_identity(values))
+            decoded.fields.append(Field("identity", identity, identity))
         self._parameter_fields(decoded, values)
         if "size" in values:
-            decoded.fields.append(Field("size", values["size"], count_text(values["size"])))
+            decoded.fields.append(Field("size", values["size"], _count_text(values["size"])))
         name, size = function.layout[-1] if function.layout else ("", 1)
         if size == 0 and name != "value":
-            decoded.fields.append(Field(name, values.tail.hex().upper(), raw_text(values.tail)))
+            decoded.fields.append(_raw_field(name, values.tail))
 
-    def _response(self, decoded: Decoded, values: _Values) -> Field:
+    def _response(self, decoded: Decoded, values: Values) -> Field:
         if "response" not in values:
             return Field("response", _SUCCESS, "success (not said, D-BUS-18)")
         number = values["response"]
         names = _PARAMETER_RESPONSES if decoded.code in (0x83, 0x84) else _RESPONSES
         return Field("response", number, names.get(number, f"{number} (not defined)"))
 
-    def _parameter_fields(self, decoded: Decoded, values: _Values) -> None:
+    def _parameter_fields(self, decoded: Decoded, values: Values) -> None:
         if "channel" not in values:
             return
         channel = values["channel"]
-        direction = self._direction(decoded, values)
-        of = DIRECTIONS.get(direction, "") if channel else "the device"
-        place = Field("channel", channel, f"{channel} ({of})" if of else str(channel))
+        kind = self._kind(decoded, values)
         if "parameter" not in values:
-            decoded.fields.append(place)
+            decoded.fields.append(_channel_field(channel, kind))
             return
         number = values["parameter"]
-        parameter = parameter_of(channel, number, direction)
-        name = parameter.name if parameter else ""
-        decoded.fields.append(Field("parameter", number, f"{number} ({name})" if name else str(number)))
-        decoded.fields.append(place)
+        decoded.fields += _place_fields(channel, number, kind)
         if values.tail or (decoded.code == 0x83 and values["response"] == _SUCCESS):
-            decoded.fields += value_fields(parameter, values.tail)
+            decoded.fields += _value_fields(_parameter_of(channel, number, kind), values.tail)
 
-    def _direction(self, decoded: Decoded, values: _Values) -> int:
-        """Which way a channel goes: as its transfer type said, or as what is written to it tells."""
+    def _kind(self, decoded: Decoded, values: Values) -> Kind | None:
+        """What a channel is: as its transfer type said, or as what is written to it tells."""
         channel = values["channel"]
+        if channel == 0:
+            return None
         device = self._devices.get(decoded.node)
-        known = device.direction(channel) if device else 0
-        if known or channel == 0:
-            return known
+        known = device.kind(channel) if device else None
         number, size = values.get("parameter"), len(values.tail)
-        if decoded.code in (0x0F, 0x8F) or number in ONLY_INPUTS:
-            return INPUT
-        if number == 5 and size:
-            return OUTPUT if size == 1 else INPUT
-        return 0
+        if known:
+            return known
+        if decoded.code in (0x0F, 0x8F) or number in _ONLY_INPUTS:
+            return Kind.INPUT
+        if number == _NODE_ID and size:
+            return Kind.OUTPUT if size == 1 else Kind.INPUT
+        return None
 
     def _check_place(self, decoded: Decoded) -> None:
         """A sound message from who must not send it, or to whom it must not go."""
-        function = _FUNCTIONS.get(decoded.code)
+        function = FUNCTIONS.get(decoded.code)
         if decoded.problem:
             return
         if not decoded.from_arbitrator and decoded.priority != _BINDING and decoded.node in (0, _UNUSED_NODE):
-            decoded.problem = f"no device has the id {node_text(decoded.node)}"
+            decoded.problem = f"no device has the id {_node_text(decoded.node)}"
         elif function is None:
             return
         elif decoded.from_arbitrator and not function.arbitrator:
@@ -420,7 +405,7 @@ class Decoder:
     def _follow(self, decoded: Decoded) -> None:
         """What the next frames mean depends on this one."""
         code, node = decoded.code, decoded.node
-        values = _split(_FUNCTIONS[code], decoded.frame.data)
+        values = split(FUNCTIONS[code], decoded.frame.data)
         if code == 0x81:
             self._bound(decoded, values)
             return
@@ -447,7 +432,7 @@ class Decoder:
             self._acknowledged(decoded, device, values)
 
     @staticmethod
-    def _pair(decoded: Decoded, device: _Device, values: _Values) -> None:
+    def _pair(decoded: Decoded, device: _Device, values: Values) -> None:
         """Says of an answer that nobody asked for it."""
         key = (decoded.code & 0x7F, values.get("parameter", 0), values.get("channel", 0))
         if key[0] not in _ANSWERED:
@@ -464,9 +449,9 @@ class Decoder:
         self._outputs.pop(node, None)
         self._devices.setdefault(node, _Device())
 
-    def _bound(self, decoded: Decoded, values: _Values) -> None:
+    def _bound(self, decoded: Decoded, values: Values) -> None:
         requested, granted = decoded.node, values["node"]
-        identity = ":".join(f"{values[name]:04X}" for name in ("vid", "pid", "serial"))
+        identity = _identity(values)
         decoded.device = identity
         if granted != requested or not 1 <= granted <= _NODE_MAX:
             return
@@ -483,7 +468,7 @@ class Decoder:
         self._devices.pop(node, None)
         self._outputs = {key: output for key, output in self._outputs.items() if output.node != node}
 
-    def _answered(self, decoded: Decoded, device: _Device, values: _Values) -> None:
+    def _answered(self, decoded: Decoded, device: _Device, values: Values) -> None:
         channel, parameter = values["channel"], values["parameter"]
         written = device.written.pop((channel, parameter), b"") if decoded.code == 0x84 else b""
         if values.get("response") == _SUCCESS:
@@ -492,30 +477,25 @@ class Decoder:
     def _learn(self, node: int, device: _Device, channel: int, parameter: int, value: bytes) -> None:
         """A parameter has this value."""
         if channel == 0:
-            if parameter == 1:
-                device.vid_pid = f"{word_at(value):04X}:{word_at(value, 2):04X}"
-                if not device.identity.startswith(device.vid_pid):
-                    device.identity = ""  # another device has taken the id
-            elif parameter == 2 and device.vid_pid:
-                device.identity = f"{device.vid_pid}:{word_at(value):04X}"
+            _learn_identity(device, parameter, value)
             return
         known = device.channel(channel)
-        if parameter == 3 and word_at(value, 0, 1) in DIRECTIONS:
-            known.direction = word_at(value, 0, 1)
-        elif parameter == 1:
+        if parameter == TRANSFER_TYPE and word_at(value, 0, 1) in TRANSFER_KINDS:
+            known.kind = TRANSFER_KINDS[word_at(value, 0, 1)]
+        elif parameter == _TYPE:
             known.type, known.profile = word_at(value), word_at(value, 2)
-        elif parameter == 5 and (known.direction == OUTPUT or (not known.direction and len(value) == 1)):
-            known.direction = OUTPUT
+        elif parameter == _NODE_ID and (known.kind is Kind.OUTPUT or (known.kind is None and len(value) == 1)):
+            known.kind = Kind.OUTPUT
             self._output_node(word_at(value, 0, 1), _Output(node, channel))
-        elif parameter in ONLY_INPUTS and known.direction != OUTPUT:
-            known.direction = INPUT
+        elif parameter in _ONLY_INPUTS and known.kind is not Kind.OUTPUT:
+            known.kind = Kind.INPUT
             self._learn_source(known, parameter, value)
 
     def _learn_source(self, known: _Channel, parameter: int, value: bytes) -> None:
         """What an input hears tells of the output that it hears, too."""
-        if parameter == 6:
+        if parameter == _SOURCE_CHANNEL:
             known.source_channel = 0 if word_at(value, 2, 1) == NO_CHANNEL else word_at(value, 2, 1)
-        elif parameter == 7 and word_at(value, 1, 1) and word_at(value, 1, 1) not in self._outputs:
+        elif parameter == _SOURCE_NODES and word_at(value, 1, 1) and word_at(value, 1, 1) not in self._outputs:
             self._output_node(word_at(value, 1, 1), _Output(word_at(value, 0, 1), known.source_channel))
 
     def _output_node(self, node: int, output: _Output) -> None:
@@ -527,7 +507,7 @@ class Decoder:
 
     # --- bulk transfer ---
 
-    def _configured(self, decoded: Decoded, device: _Device, values: _Values) -> None:
+    def _configured(self, decoded: Decoded, device: _Device, values: Values) -> None:
         transfer = device.transfer
         asked = (values["parameter"], values["channel"], decoded.code == 0x8D)
         if transfer is None or asked != (transfer.parameter, transfer.channel, transfer.to_device):
@@ -539,7 +519,7 @@ class Decoder:
             if transfer.size == 0:
                 self._complete(decoded, device, transfer)
 
-    def _packet(self, decoded: Decoded, device: _Device, values: _Values) -> None:
+    def _packet(self, decoded: Decoded, device: _Device, values: Values) -> None:
         transfer = device.transfer
         if transfer is None or transfer.size < 0 or transfer.to_device != decoded.from_arbitrator:
             decoded.notes.append("no transfer is known")
@@ -550,15 +530,15 @@ class Decoder:
                 decoded.notes.append("repeated")
             transfer.waiting = data
             begin, end = len(transfer.data), len(transfer.data) + len(data)
-            decoded.fields.append(Field("offset", begin, f"{begin} of {count_text(transfer.size)}"))
+            decoded.fields.append(Field("offset", begin, f"{begin} of {_count_text(transfer.size)}"))
             if end > transfer.size:
-                decoded.notes.append(f"{count_text(end - transfer.size)} too many")
+                decoded.notes.append(f"{_count_text(end - transfer.size)} too many")
         elif packet == transfer.packet - 1 & 0xFF and transfer.data:
             decoded.notes.append("repeated")
         else:
             decoded.notes.append(f"packet {transfer.packet} was expected")
 
-    def _acknowledged(self, decoded: Decoded, device: _Device, values: _Values) -> None:
+    def _acknowledged(self, decoded: Decoded, device: _Device, values: Values) -> None:
         transfer = device.transfer
         if transfer is None or transfer.size < 0 or transfer.to_device == decoded.from_arbitrator:
             decoded.notes.append("no transfer is known")
@@ -576,39 +556,48 @@ class Decoder:
         data = bytes(transfer.data[: transfer.size])
         number, channel = transfer.parameter, transfer.channel
         self._learn(decoded.node, device, channel, number, data)
-        parameter = parameter_of(channel, number, device.direction(channel))
-        decoded.fields.append(Field("complete", len(data), count_text(len(data))))
+        kind = device.kind(channel)
+        decoded.fields.append(Field("complete", len(data), _count_text(len(data))))
         if decoded.code == 0x8E:  # the configure frames name them themselves
-            name = f"{number} ({parameter.name})" if parameter else str(number)
-            decoded.fields.append(Field("parameter", number, name))
-            of = DIRECTIONS.get(device.direction(channel), "") if channel else "the device"
-            decoded.fields.append(Field("channel", channel, f"{channel} ({of})" if of else str(channel)))
-        decoded.fields += value_fields(parameter, data)
+            decoded.fields += _place_fields(channel, number, kind)
+        decoded.fields += _value_fields(_parameter_of(channel, number, kind), data)
 
 
-def _split(function: _Function, data: bytes) -> _Values:
-    """The fields that are there, by name."""
-    values = _Values()
-    at = 1
-    for name, size in function.layout:
-        if size == 0:
-            values.tail = data[at:]
-        elif len(data) >= at + size:
-            values[name] = word_at(data, at, size)
-        at += size
-    return values
+def _identity(values: Values) -> Identity:
+    return Identity(values["vid"], values["pid"], values["sn"])
+
+
+def _learn_identity(device: _Device, parameter: int, value: bytes) -> None:
+    """Parameters 1 and 2 of a device are who it is."""
+    if parameter == 1:
+        device.vid_pid = word_at(value), word_at(value, 2)
+        if device.identity and device.vid_pid != (device.identity.vid, device.identity.pid):
+            device.identity = None  # another device has taken the id
+    elif parameter == 2 and device.vid_pid:
+        device.identity = Identity(*device.vid_pid, word_at(value))
+
+
+def _channel_field(channel: int, kind: Kind | None) -> Field:
+    of = kind if channel else "the device"
+    return Field("channel", channel, f"{channel} ({of})" if of else str(channel))
+
+
+def _place_fields(channel: int, number: int, kind: Kind | None) -> list[Field]:
+    """Which parameter of what."""
+    parameter = _parameter_of(channel, number, kind)
+    name = f"{number} ({parameter.name})" if parameter else str(number)
+    return [Field("parameter", number, name), _channel_field(channel, kind)]
 
 
 def _plain_field(decoded: Decoded, name: str, value: int) -> Field:
     if name == "time":
-        return Field(
-            "time", value, ms_text(value) + (" (until released)" if value == 0 and decoded.code == 0x08 else "")
-        )
+        forever = value == 0 and decoded.code == 0x08
+        return Field("time", value, f"{value} ms (until released)" if forever else f"{value} ms")
     if name == "packet":
         return Field("packet", value, str(value))
     if value == 0:
         return Field("node", value, "00h (refused)")
-    return Field("node", value, f"{node_text(value)} ({'granted' if value == decoded.node else 'suggested'})")
+    return Field("node", value, f"{_node_text(value)} ({'granted' if value == decoded.node else 'suggested'})")
 
 
 def format_line(decoded: Decoded) -> str:
@@ -637,7 +626,7 @@ def to_json(decoded: Decoded) -> dict[str, object]:
         "id": frame.can_id,
         "raw": frame.data.hex().upper(),
         "meaning": decoded.meaning,
-        "device": decoded.device or None,
+        "device": str(decoded.device) if decoded.device else None,
     }
     if frame.is_base:
         out |= {

@@ -41,7 +41,6 @@ class Identity:
 
 
 BROADCAST = Identity(0, 0, 0)
-NO_DEVICE = Identity(UINT16_MAX, UINT16_MAX, UINT16_MAX)  # the source of an unconnected input (D-BUS-7)
 
 
 @dataclass(frozen=True, order=True, slots=True)
@@ -62,9 +61,6 @@ class ChannelId:
 
     def __str__(self) -> str:
         return f"{self.identity}.{self.index}" if self.index else str(self.identity)
-
-
-NOT_CONNECTED = ChannelId(NO_DEVICE, UINT8_MAX)
 
 
 class Direction(StrEnum):

@@ -13,6 +13,7 @@ from .errors import BadAnswerError, ErrorCode, RequestError, ResetError
 from .events import EventKind
 from .model import (
     BROADCAST,
+    UINT16_MAX,
     Action,
     ArbitratorInfo,
     Channel,
@@ -122,6 +123,8 @@ def _command(identity: Identity | None, data: bytes) -> Operation[None]:
 
 
 def suspend(identity: Identity | None, time_ms: int) -> Operation[None]:
+    if not 0 <= time_ms <= UINT16_MAX:
+        raise m.FormatError(f"a device cannot be suspended for {time_ms} ms, only for 0 to {UINT16_MAX}")
     return _command(identity, bytes([SUSPEND]) + time_ms.to_bytes(2, "little"))
 
 

@@ -1,7 +1,7 @@
-"""Parameters of devices and channels (pdcp-bus.md 4; [PROFILE tables 2.8, 2.9 and 2.10]): names, units, layouts, and
+"""Parameters of devices and channels (pdcp-bus.md 4; [PROFILE tables 2.8 and 2.9 and 2.10]): names, units, layouts, and
 their values as text."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -9,9 +9,10 @@ from .model import Direction, parse_number
 from .profiles import describe_type, parse_profile, profile_name
 
 BITS_MAX = 32 * 8  # channels that a required or desired string can name (D-BUS-8)
+NO_CHANNEL = 0xFF  # index in the source of an input that is not connected (D-BUS-7)
 
 # Values of an input's parameters 5 to 8 when it is not connected (D-BUS-7).
-_NO_SOURCE = {5: [0xFFFF, 0xFFFF], 6: [0xFFFF, 0xFF], 7: [0, 0], 8: [0, 0]}
+_NO_SOURCE = {5: [0xFFFF, 0xFFFF], 6: [0xFFFF, NO_CHANNEL], 7: [0, 0], 8: [0, 0]}
 
 
 class Kind(StrEnum):
@@ -26,11 +27,13 @@ class Style(StrEnum):
     """How a field is shown and read."""
 
     NUMBER = "number"
+    MILLISECONDS = "milliseconds"
+    NODE = "node"  # id
     WORD = "word"  # in hexadecimal
     TYPE = "type"  # of a channel
     PROFILE = "profile"
     SWITCH = "switch"
-    DIRECTION = "direction"  # transfer type
+    TRANSFER = "transfer"  # transfer type
 
 
 class Form(StrEnum):
@@ -40,6 +43,9 @@ class Form(StrEnum):
     TEXT = "text"  # UTF-8 without a terminator
     CHANNELS = "channels"  # bit string; most significant bit of the first byte: channel 0 (D-BUS-8)
 
+
+TRANSFER_KINDS = {1: Kind.INPUT, 2: Kind.OUTPUT}
+_SWITCHES = {0: "off", 1: "on"}
 
 FieldValue = int | str | bool
 Decoded = dict[str, FieldValue] | str | list[int]
@@ -59,9 +65,9 @@ class Field:
 
     def decode(self, number: int) -> FieldValue:
         if self.style is Style.SWITCH:
-            return bool(number)
-        if self.style is Style.DIRECTION:
-            return {1: "input", 2: "output"}.get(number, number)
+            return bool(number) if number in _SWITCHES else number
+        if self.style is Style.TRANSFER and number in TRANSFER_KINDS:
+            return str(TRANSFER_KINDS[number])
         return number
 
     def show(self, number: int) -> str:
@@ -72,16 +78,18 @@ class Field:
                 return f"{describe_type(number)} ({number:04X}h)"
             case Style.PROFILE:
                 return show_profile(number)
+            case Style.MILLISECONDS:
+                return f"{number} ms"
             case Style.SWITCH:
-                return {0: "off", 1: "on"}.get(number, str(number))
-            case Style.DIRECTION:
-                return {1: "input", 2: "output"}.get(number, str(number))
+                return _SWITCHES.get(number, str(number))
+            case Style.TRANSFER:
+                return str(TRANSFER_KINDS.get(number, number))
             case _:
                 return str(number)
 
     def parse(self, text: str) -> bytes:
-        words = {"on": 1, "off": 0} if self.style is Style.SWITCH else {}
-        words |= {"input": 1, "output": 2} if self.style is Style.DIRECTION else {}
+        known: dict[Style, Mapping[int, str]] = {Style.SWITCH: _SWITCHES, Style.TRANSFER: TRANSFER_KINDS}
+        words = {word: number for number, word in known.get(self.style, {}).items()}
         if text.lower() in words:
             number = words[text.lower()]
         elif self.style is Style.PROFILE and not text.isdecimal() and not text.lower().startswith("0x"):
@@ -96,6 +104,7 @@ class Field:
 
 
 _VENDOR = (Field("vid", 2), Field("pid", 2))
+_NODES = (Field("device_node", 1, Style.NODE), Field("output_node", 1, Style.NODE))
 _CHANNEL_TYPE = (Field("type", 2, Style.TYPE), Field("profile", 2, Style.PROFILE))
 
 
@@ -108,15 +117,14 @@ class Parameter:
     name: str
     fields: tuple[Field, ...] = ()
     form: Form = Form.FIELDS
-    unit: str = ""
 
     @property
     def size(self) -> int | None:
         """Bytes of a value; None: as long as it is."""
         return sum(field.size for field in self.fields) if self.form is Form.FIELDS else None
 
-    def _numbers(self, value: bytes) -> list[int]:
-        # Missing bytes are 0, extra ones are ignored.
+    def numbers(self, value: bytes) -> list[int]:
+        """The number in each field; missing bytes are 0, extra ones are ignored."""
         numbers = []
         for field in self.fields:
             numbers.append(int.from_bytes(value[: field.size], "little"))
@@ -129,8 +137,12 @@ class Parameter:
             return value.decode(errors="replace")
         if self.form is Form.CHANNELS:
             return channels_of(value)
-        numbers = self._numbers(value)
+        numbers = self.numbers(value)
         return {field.name: field.decode(number) for field, number in zip(self.fields, numbers, strict=True)}
+
+    def is_no_source(self, value: bytes) -> bool:
+        """Does it say of an input that it is not connected?"""
+        return self.kind is Kind.INPUT and _NO_SOURCE.get(self.number) == self.numbers(value)
 
     def show(self, value: bytes) -> str:
         """A value as people read it: one line, without control characters."""
@@ -138,12 +150,11 @@ class Parameter:
             return "".join(each if each.isprintable() else "\ufffd" for each in value.decode(errors="replace"))
         if self.form is Form.CHANNELS:
             return ", ".join(str(each) for each in channels_of(value)) or "none"
-        numbers = self._numbers(value)
-        if self.kind is Kind.INPUT and _NO_SOURCE.get(self.number) == numbers:
+        if self.is_no_source(value):
             return "none"
-        shown = [field.show(number) for field, number in zip(self.fields, numbers, strict=True)]
+        shown = [field.show(number) for field, number in zip(self.fields, self.numbers(value), strict=True)]
         if len(shown) == 1:
-            return f"{shown[0]} {self.unit}".rstrip()
+            return shown[0]
         if self.fields == _CHANNEL_TYPE:
             return "; ".join(shown)
         return ", ".join(f"{field.label} {text}" for field, text in zip(self.fields, shown, strict=True))
@@ -194,11 +205,11 @@ DEVICE_PARAMETERS = (
     Parameter(Kind.DEVICE, 5, "version", (Field("firmware", 2), Field("hardware", 2))),
     Parameter(Kind.DEVICE, 6, "type", (Field("type", 2, Style.WORD), Field("profile", 2, Style.WORD))),
     Parameter(Kind.DEVICE, 7, "descriptor", form=Form.TEXT),
-    Parameter(Kind.DEVICE, 8, "node-id", _one("node_id", 1)),
+    Parameter(Kind.DEVICE, 8, "node-id", _one("node_id", 1, Style.NODE)),
     Parameter(Kind.DEVICE, 9, "channels", _one("channels", 1)),
-    Parameter(Kind.DEVICE, 10, "beacon-interval", _one("beacon_interval", 2), unit="ms"),
-    Parameter(Kind.DEVICE, 11, "ack-time", _one("ack_time", 2), unit="ms"),
-    Parameter(Kind.DEVICE, 12, "bind-timeout", _one("bind_timeout", 2), unit="ms"),
+    Parameter(Kind.DEVICE, 10, "beacon-interval", _one("beacon_interval", 2, Style.MILLISECONDS)),
+    Parameter(Kind.DEVICE, 11, "ack-time", _one("ack_time", 2, Style.MILLISECONDS)),
+    Parameter(Kind.DEVICE, 12, "bind-timeout", _one("bind_timeout", 2, Style.MILLISECONDS)),
 )
 
 
@@ -206,7 +217,7 @@ def _of_channel(kind: Kind) -> tuple[Parameter, ...]:
     return (
         Parameter(kind, 1, "type", _CHANNEL_TYPE),
         Parameter(kind, 2, "descriptor", form=Form.TEXT),
-        Parameter(kind, 3, "transfer-type", _one("transfer_type", 1, Style.DIRECTION)),
+        Parameter(kind, 3, "transfer-type", _one("transfer_type", 1, Style.TRANSFER)),
         Parameter(kind, 4, "enabled", _one("enabled", 1, Style.SWITCH)),
     )
 
@@ -222,7 +233,7 @@ INPUT_PARAMETERS = (
     *_of_channel(Kind.INPUT),
     Parameter(Kind.INPUT, 5, "source-device", _VENDOR),
     Parameter(Kind.INPUT, 6, "source-channel", (Field("sn", 2), Field("index", 1))),
-    Parameter(Kind.INPUT, 7, "source-nodes", (Field("device_node", 1), Field("output_node", 1))),
+    Parameter(Kind.INPUT, 7, "source-nodes", _NODES),
     Parameter(Kind.INPUT, 8, "source-type", _CHANNEL_TYPE),
     *_needs(Kind.INPUT),
     Parameter(Kind.INPUT, 11, "terminal-profile", _one("terminal_profile", 2, Style.PROFILE)),
@@ -230,16 +241,23 @@ INPUT_PARAMETERS = (
 
 OUTPUT_PARAMETERS = (
     *_of_channel(Kind.OUTPUT),
-    Parameter(Kind.OUTPUT, 5, "node-id", _one("node_id", 1)),
+    Parameter(Kind.OUTPUT, 5, "node-id", _one("node_id", 1, Style.NODE)),
     *_needs(Kind.OUTPUT),
 )
 
 PARAMETERS = {Kind.DEVICE: DEVICE_PARAMETERS, Kind.INPUT: INPUT_PARAMETERS, Kind.OUTPUT: OUTPUT_PARAMETERS}
+_BY_NUMBER = {(each.kind, each.number): each for rows in PARAMETERS.values() for each in rows}
+
 TRANSFER_TYPE = 3  # parameter of a channel that says which kind it is
 
 
 def kind_of(direction: Direction) -> Kind:
     return Kind.INPUT if direction is Direction.INPUT else Kind.OUTPUT
+
+
+def by_number(kind: Kind, number: int) -> Parameter | None:
+    """None: this kind has no such parameter, as far as the specification goes."""
+    return _BY_NUMBER.get((kind, number))
 
 
 def find(kind: Kind, text: str) -> Parameter | int:
@@ -255,4 +273,4 @@ def find(kind: Kind, text: str) -> Parameter | int:
     number = parse_number(text)
     if not 0 <= number <= 0xFF:
         raise ValueError(f"parameter {number} is not between 0 and 255")
-    return next((each for each in PARAMETERS[kind] if each.number == number), number)
+    return by_number(kind, number) or number

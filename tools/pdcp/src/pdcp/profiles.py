@@ -9,7 +9,7 @@ import tomllib
 from dataclasses import dataclass
 from importlib import resources
 
-__all__ = ["Profile", "describe_type", "parse_profile", "profile_name", "profile_path", "profiles"]
+__all__ = ["Profile", "channel_value", "describe_type", "parse_profile", "profile_name", "profile_path", "profiles"]
 
 _HEX_WORD = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})|([0-9A-Fa-f]{4})[hH]?|([0-9A-Fa-f]{1,4})[hH]")
 
@@ -17,7 +17,7 @@ _SIZES = ("4 bits", "8 bits", "12 bits", "16 bits")
 _DATA = ("signed", "unsigned", "float", "boolean")
 _CONTROL = ("position", "velocity", "acceleration", "other")
 _PRESCALERS = ("", "x10^-6", "x10^-3", "x10^-1", "x10", "x10^2", "x10^3", "x10^6")
-_FLOAT = 2
+_SIGNED, _FLOAT, _BOOLEAN = 0, 2, 3
 _BITS_16 = 3
 
 
@@ -114,3 +114,16 @@ def describe_type(word: int) -> str:
     if word & 0x1F:
         words.append(f"unused bits {word & 0x1F:02X}h")
     return ", ".join(words)
+
+
+def channel_value(word: int, data: bytes) -> int | bool | None:
+    """What a frame of a channel of this type says; None: it is empty, or a float."""
+    bits = 4 * ((word >> 14 & 3) + 1)
+    kind = word >> 12 & 3
+    number = int.from_bytes(data[: 1 if bits <= 8 else 2], "little") & ((1 << bits) - 1)
+    if not data or kind == _FLOAT:
+        return None
+    if kind == _BOOLEAN:
+        return bool(number)
+    is_negative = kind == _SIGNED and number >> (bits - 1)
+    return number - (1 << bits) if is_negative else number

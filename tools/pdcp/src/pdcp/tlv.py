@@ -48,7 +48,7 @@ _NAMES[OWNER_TYPE], _NAMES[OWNER_PROFILE] = "owner_type", "owner_profile"
 _CODES = {name: code for code, name in _NAMES.items()}
 _VALUE_CODES = {name: code for code, name in _VALUES.items()}
 _CODE_KEY = re.compile(r"code_(\d{1,3})")
-_DECIMAL = {CHANNEL_INDEX, CONFIGURATIONS, CONFIGURATION, LINKS, LINK}
+_DECIMAL = {CHANNEL_INDEX, CONFIGURATIONS, CONFIGURATION, LINKS, LINK, OWNER_VID, OWNER_PID, OWNER_SN}
 
 
 class TlvError(ValueError):

@@ -25,9 +25,14 @@ def options(
     port: Annotated[
         str | None, typer.Option("--port", "-p", envvar="PDCP_PORT", metavar="PATH", help="Serial port or pty.")
     ] = None,
-    baud: Annotated[int, typer.Option("--baud", min=1, help="57600 or 128000 bit/s; a pty takes any.")] = 128000,
+    baud: Annotated[
+        int, typer.Option("--baud", min=1, metavar="RATE", help="57600 or 128000 bit/s; a pty takes any.")
+    ] = 128000,
     timeout: Annotated[float, typer.Option("--timeout", min=0.01, metavar="S", help="Seconds for an answer.")] = 4.0,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")] = False,
+    version: Annotated[
+        bool, typer.Option("--version", is_eager=True, callback=ports.print_version, help="Show the version and exit.")
+    ] = False,
 ) -> None:
     ctx.obj = Settings(port, baud, timeout, as_json)
 

@@ -34,7 +34,9 @@ ChannelOption = Annotated[
 BusOption = Annotated[
     list[str] | None, typer.Option("--option", "-o", metavar="KEY=VALUE", help="More for python-can; repeatable.")
 ]
-SecondsOption = Annotated[float | None, typer.Option("--seconds", min=0, help="Listen so long; else until Ctrl-C.")]
+SecondsOption = Annotated[
+    float | None, typer.Option("--seconds", min=0, metavar="S", help="Listen so long; else until Ctrl-C.")
+]
 
 
 class Complaints:
@@ -128,8 +130,8 @@ def dump(
     as_json: JsonOption = False,
 ) -> None:
     """Say what the frames of a log, a capture or a bus mean, one line a frame. A line holds the time, the identifier,
-    who speaks to whom (BA is the arbitrator), the message and its fields. Node ids, identities, types and profiles
-    are hexadecimal. Behind ! stands what is wrong with a frame. With --json a line is an object.
+    who speaks to whom (BA is the arbitrator), the message and its fields. Node ids, types, profiles and raw bytes
+    are hexadecimal, all else is decimal. Behind ! stands what is wrong with a frame. With --json a line is an object.
     """
     source = Source(file, interface, channel, option, seconds)
     decoder = Decoder()
@@ -302,7 +304,7 @@ def replay(
     interface: InterfaceOption,
     channel: ChannelOption = "",
     option: BusOption = None,
-    speed: Annotated[float, typer.Option("--speed", min=0.001, help="2 is twice as fast.")] = 1.0,
+    speed: Annotated[float, typer.Option("--speed", min=0.001, metavar="X", help="2 is twice as fast.")] = 1.0,
     no_wait: Annotated[bool, typer.Option("--no-wait", help="Send as fast as the bus takes it.")] = False,
 ) -> None:
     """Send the frames of a log to a bus, with the times between them. All frames are sent, whoever sent them before.

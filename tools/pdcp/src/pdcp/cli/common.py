@@ -11,10 +11,12 @@ from enum import IntEnum
 from typing import Annotated, Any
 
 import typer
+import typer.main
 from rich import box
 from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+from typer.core import TyperGroup, TyperOption
 from typer.exceptions import Abort, Exit, TyperException
 
 from ..client import Client
@@ -166,10 +168,24 @@ def _status_of(error: PdcpError) -> Status:
     return Status.REFUSED
 
 
+def _tidy_help(group: TyperGroup) -> None:
+    """Typer's help tells the type of every option, also of one that takes no value and of --help; a text to stand in
+    its place, even an empty one, goes before it."""
+    for command in (group, *group.commands.values()):
+        for option in command.get_params(typer.Context(command)):
+            if isinstance(option, TyperOption) and option.is_flag:
+                option.metavar = ""
+        if isinstance(command, TyperGroup) and command is not group:
+            _tidy_help(command)
+
+
 def run(app: typer.Typer, arguments: Sequence[str]) -> int:
     """Runs the application and returns its exit code; whatever went wrong is one line on standard error."""
+    command = typer.main.get_command(app)
+    if isinstance(command, TyperGroup):
+        _tidy_help(command)
     try:
-        status = app(args=list(arguments), prog_name="pdcp", standalone_mode=False)
+        status = command.main(list(arguments), prog_name="pdcp", standalone_mode=False)
         sys.stdout.flush()
         return status if isinstance(status, int) else Status.OK
     except Exit as end:

@@ -7,7 +7,7 @@ from rich.text import Text
 
 from ..client import Client
 from ..model import BROADCAST, ChannelId, Identity, parse_number
-from ..parameters import PARAMETERS, TRANSFER_TYPE, Kind, Parameter, find
+from ..parameters import PARAMETERS, TRANSFER_KINDS, TRANSFER_TYPE, Kind, Parameter, find
 from . import targets
 from .common import Json, JsonOption, UsageFault, connect, show, waiting
 from .tables import parameter_grid, parameter_json, parameters_json, read_parameters
@@ -19,7 +19,7 @@ SIZES = {"u8": 1, "u16": 2, "u32": 4}
 
 TargetArgument = Annotated[str, typer.Argument(metavar="TARGET", help=targets.TARGET_HELP)]
 DevicesArgument = Annotated[
-    list[str] | None, typer.Argument(metavar="[DEVICE]", help=f"{targets.DEVICE_HELP} Without: all.")
+    list[str] | None, typer.Argument(metavar="DEVICE", help=f"{targets.DEVICE_HELP} Without: all.")
 ]
 
 
@@ -40,7 +40,7 @@ def _kind(client: Client, target: ChannelId) -> Kind:
     if target.index == 0:
         return Kind.DEVICE
     value = client.get_parameter(target, TRANSFER_TYPE)
-    return Kind.OUTPUT if value[:1] == b"\x02" else Kind.INPUT
+    return TRANSFER_KINDS.get(int.from_bytes(value[:1]), Kind.INPUT)
 
 
 def _find(kind: Kind, text: str) -> Parameter | int:
@@ -64,7 +64,7 @@ def get(
     ctx: typer.Context,
     target: TargetArgument,
     parameter: Annotated[
-        str | None, typer.Argument(metavar="[PARAMETER]", help=f"{PARAMETER_HELP} Without: all.")
+        str | None, typer.Argument(metavar="PARAMETER", help=f"{PARAMETER_HELP} Without: all.")
     ] = None,
     raw: Annotated[bool, typer.Option("--raw", help="The bytes in hexadecimal.")] = False,
     as_json: JsonOption = False,
@@ -158,7 +158,8 @@ def suspend(
     ctx: typer.Context,
     device: DevicesArgument = None,
     ms: Annotated[
-        int, typer.Option("--ms", min=0, max=SUSPEND_MAX_MS, help="For so long; 0: until they are released.")
+        int,
+        typer.Option("--ms", min=0, max=SUSPEND_MAX_MS, metavar="MS", help="For so long; 0: until they are released."),
     ] = 0,
 ) -> None:
     """Make devices stop sending channel data."""

@@ -13,7 +13,9 @@ from . import targets
 from .common import Json, JsonOption, connect, show, waiting
 from .tables import STATUS_STYLES
 
-NumberArgument = Annotated[int, typer.Argument(metavar="N", min=1, max=255, help="Number of the configuration.")]
+NumberArgument = Annotated[
+    int, typer.Argument(metavar="N", min=0, max=255, help="Number of the configuration; 0: the active one.")
+]
 
 
 class Switch(StrEnum):
@@ -103,7 +105,7 @@ def adopt(ctx: typer.Context, as_json: JsonOption = False) -> None:
 
 def autoconfig(
     ctx: typer.Context,
-    what: Annotated[SwitchOrNow, typer.Argument(help="on, off: by itself, or not; now: once.")],
+    what: Annotated[SwitchOrNow, typer.Argument(metavar="WHAT", help="on, off: by itself, or not; now: once.")],
     as_json: JsonOption = False,
 ) -> None:
     """Connect terminal channels that have no link: now, or by itself from now on."""
@@ -115,8 +117,8 @@ def autoconfig(
 
 def flag(
     ctx: typer.Context,
-    name: Annotated[FlagName, typer.Argument(help="Which; 'pdcp info' shows all.")],
-    value: Annotated[Switch, typer.Argument()],
+    name: Annotated[FlagName, typer.Argument(metavar="NAME", help="Which; 'pdcp info' shows all.")],
+    value: Annotated[Switch, typer.Argument(metavar="VALUE")],
     as_json: JsonOption = False,
 ) -> None:
     """Switch a setting of the arbitrator on or off. It is stored."""
@@ -142,9 +144,7 @@ def _with_active(ctx: typer.Context, as_json: bool, act: Callable[[Client], str]
 
 def save(
     ctx: typer.Context,
-    number: Annotated[
-        int, typer.Argument(metavar="[N]", min=0, max=255, help="Number of the configuration; 0: the active one.")
-    ] = 0,
+    number: NumberArgument = 0,
     as_json: JsonOption = False,
 ) -> None:
     """Store the links as a configuration."""
@@ -156,7 +156,7 @@ def save(
     _with_active(ctx, as_json, act)
 
 
-def load(ctx: typer.Context, number: NumberArgument, as_json: JsonOption = False) -> None:
+def load(ctx: typer.Context, number: NumberArgument = 0, as_json: JsonOption = False) -> None:
     """Make the links of a stored configuration, and remove all others."""
 
     def act(client: Client) -> str:
@@ -166,7 +166,7 @@ def load(ctx: typer.Context, number: NumberArgument, as_json: JsonOption = False
     _with_active(ctx, as_json, act)
 
 
-def erase(ctx: typer.Context, number: NumberArgument, as_json: JsonOption = False) -> None:
+def erase(ctx: typer.Context, number: NumberArgument = 0, as_json: JsonOption = False) -> None:
     """Forget a stored configuration. Its links stay as they are."""
 
     def act(client: Client) -> str:

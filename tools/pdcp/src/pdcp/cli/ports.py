@@ -98,6 +98,13 @@ def ports(ctx: typer.Context, as_json: JsonOption = False) -> None:
     show(ctx, as_json, rows, table if rows else "no serial ports and no running pdcpd")
 
 
+def print_version(wanted: bool) -> None:
+    """The option --version."""
+    if wanted:
+        sys.stdout.write(f"pdcp {__version__}\n")
+        raise typer.Exit
+
+
 def version(ctx: typer.Context, as_json: JsonOption = False) -> None:
     """Show the version of this program; 'pdcp info' shows the arbitrator's."""
     data: Json = {
@@ -107,5 +114,3 @@ def version(ctx: typer.Context, as_json: JsonOption = False) -> None:
         "python-can": metadata.version("python-can"),
     }
     show(ctx, as_json, data, f"pdcp {__version__}")
-
-

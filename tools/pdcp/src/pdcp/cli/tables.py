@@ -14,7 +14,7 @@ from ..errors import ErrorCode, RequestError, UnknownMessageError
 from ..model import ArbitratorInfo, Channel, ChannelId, Device, Direction, Flags, Link, LinkStatus, Stats, SystemInfo
 from ..parameters import PARAMETERS, Kind, Parameter, kind_of, show_profile
 from ..profiles import describe_type, profile_name
-from .common import Json, JsonOption, connect, new_table, settings, show, waiting
+from .common import Json, JsonOption, UsageFault, connect, new_table, settings, show, waiting
 
 NamesOption = Annotated[
     bool, typer.Option("--names/--no-names", help="Ask the devices for their descriptors, or show only the tables.")
@@ -300,7 +300,7 @@ def links(ctx: typer.Context, names: NamesOption = True, as_json: JsonOption = F
 def stats(
     ctx: typer.Context,
     group: Annotated[
-        str | None, typer.Argument(help="A group: bus, host, storage, or its number. Without: all.")
+        str | None, typer.Argument(metavar="GROUP", help="A group: bus, host, storage, or its number. Without: all.")
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -312,7 +312,7 @@ def stats(
         elif group in numbers or group.isdecimal() and int(group) <= 255:
             groups = [client.stats(numbers[group] if group in numbers else int(group))]
         else:
-            raise typer.BadParameter(f"'{group}' is no group of counters; there are {', '.join(numbers)}")
+            raise UsageFault(f"'{group}' is no group of counters; there are {', '.join(numbers)}")
     data = [
         {
             "group": each.group,
@@ -412,9 +412,7 @@ def _everything(
     data: list[Json] = []
     shown: list[RenderableType] = []
     for device in device_rows:
-        own = sorted(
-            (row for row in channel_rows if row.id.identity == device.identity), key=lambda row: row.id.index
-        )
+        own = sorted((row for row in channel_rows if row.id.identity == device.identity), key=lambda row: row.id.index)
         channels = [channel_json(row, names) | {"parameters": parameters_json(read[row.id])} for row in own]
         parameters = parameters_json(read[device.id])
         data.append(device_json(device, names) | {"parameters": parameters, "channels": channels})

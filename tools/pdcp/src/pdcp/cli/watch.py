@@ -173,7 +173,9 @@ def _show_json(events: Iterator[Event | None]) -> None:
 def watch(
     ctx: typer.Context,
     frames: Annotated[bool, typer.Option("--frames", help="CAN frames too.")] = False,
-    count: Annotated[int | None, typer.Option("--count", "-n", min=1, help="End after so many events.")] = None,
+    count: Annotated[
+        int | None, typer.Option("--count", "-n", min=1, metavar="N", help="End after so many events.")
+    ] = None,
     seconds: Annotated[float | None, typer.Option("--for", min=0, metavar="S", help="End after S seconds.")] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -195,5 +197,3 @@ def watch(
         finally:
             with suppress(PdcpError):
                 client.stream(())
-
-

@@ -15,7 +15,10 @@ CLEAN_TREE = {
     "profile/profile_type.c": '#include "pdcp_codec.h"\n',
     "firmware/arb_app.c": '#include "pdcp_codec.h"\n#include <string.h>\n',
     "firmware/main_dspic33.c": '#include <xc.h>\n#include "hal_can.h"\nint main(void)\n{\n    return 0;\n}\n',
+    "firmware/node_dspic33.c": '#include <xc.h>\n#include "hal_can.h"\nint main(void)\n{\n    return 0;\n}\n',
     "hal/include/hal_can.h": '#include "can_frame.h"\n',
+    "hal/dspic33/part.h": "#include <xc.h>\n",
+    "tests/fakes/xc.h": "",
     "hal/linux/loop.h": "#include <time.h>\n",
     "hal/linux/loop.c": '#include "loop.h"\n#include "hal_can.h"\n#include <stdio.h>\n',
     "host_sim/sim_bus.c": '#include "loop.h"\n#include "pdcp_codec.h"\n',
@@ -66,6 +69,7 @@ def test_tree_without_sources_is_an_error(tmp_path: Path) -> None:
         ("hal/include/hal_bad.h", '"loop.h"'),
         ("hal/dspic33/bad.c", '"loop.h"'),
         ("firmware/main_dspic33.c", '"sim_bus.h"'),
+        ("firmware/arb_bad.c", "<xc.h>"),
     ],
 )
 def test_forbidden_include_is_found(tmp_path: Path, path: str, include: str) -> None:

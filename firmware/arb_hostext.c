@@ -53,7 +53,7 @@ static uint8_t action(arb_call_t *call)
         call->answer_len = 2;
         return error;
     }
-    if (arb_call_is_busy(call)) {
+    if (arb_call_is_busy(call) || arb_limb_is_starting(limb, call->arb)) {
         return arb_call_wait_ready(call);
     }
     error = arb_limb_act(limb, call->arb, call->now_ms, call->payload[0], call->payload[1]);

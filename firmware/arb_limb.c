@@ -361,6 +361,24 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
     end(limb, error_of((arb_config_status_t)limb->status), 0);
 }
 
+/* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come. */
+static void plan_for_host(arb_limb_t *limb, pdcp_arb_t *arb, profile_purpose_t purpose, uint8_t what)
+{
+    if (limb->run.state != PROFILE_WAITING) {
+        plan(limb, arb, purpose, what);
+        return;
+    }
+    if (purpose == PROFILE_FOR_CLEAR) {
+        profile_run_load_begin(&limb->run, false);
+    }
+    end(limb, ARB_OK, 0);
+}
+
+bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb)
+{
+    return profile_run_is_starting(&limb->run, arb);
+}
+
 uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t action, uint8_t argument)
 {
     uint8_t error = ARB_OK;
@@ -377,16 +395,16 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
         error = begin_erase(limb, now_ms, argument);
         break;
     case ARB_ACTION_AUTOCONFIGURE:
-        plan(limb, arb, PROFILE_FOR_EVENT, PROFILE_PLAN_AUTO);
+        plan_for_host(limb, arb, PROFILE_FOR_EVENT, PROFILE_PLAN_AUTO);
         break;
     case ARB_ACTION_CLEAR:
-        plan(limb, arb, PROFILE_FOR_CLEAR, 0);
+        plan_for_host(limb, arb, PROFILE_FOR_CLEAR, 0);
         break;
     case ARB_ACTION_ENFORCE:
-        plan(limb, arb, PROFILE_FOR_ENFORCE, 0);
+        plan_for_host(limb, arb, PROFILE_FOR_ENFORCE, 0);
         break;
     case ARB_ACTION_REPLACE:
-        plan(limb, arb, PROFILE_FOR_EVENT, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE);
+        plan_for_host(limb, arb, PROFILE_FOR_EVENT, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE);
         break;
     case ARB_ACTION_ADOPT:
         end(limb, ARB_OK, profile_run_adopt(&limb->run, arb));
@@ -403,13 +421,15 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
 
 void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms, const pdcp_event_t *event)
 {
-    if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb */
+    profile_run_on_event(&limb->run, arb, now_ms, event);
+    if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb, and nothing of it to be saved */
         set_active(limb, 0);
+        (void)profile_run_take_change(&limb->run);
+        limb->unsaved = false;
         if (limb->stage == STAGE_PLAN) { /* what the memory is doing goes on */
             end(limb, ARB_ERR_NOT_READY, 0);
         }
     }
-    profile_run_on_event(&limb->run, arb, now_ms, event);
 }
 
 /* A job of arb_config has ended. */
@@ -443,8 +463,8 @@ static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
 /* Is there something to be saved, and nothing in the way? */
 static bool may_auto_save(const arb_limb_t *limb)
 {
-    return limb->unsaved && limb->stage == STAGE_IDLE && !profile_run_is_busy(&limb->run) &&
-           (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0;
+    return limb->unsaved && limb->stage == STAGE_IDLE && limb->run.state == PROFILE_RUNNING &&
+           !profile_run_is_busy(&limb->run) && (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0;
 }
 
 static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
@@ -453,8 +473,7 @@ static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
         limb->unsaved = true;
         limb->changed_ms = now_ms;
     }
-    if (may_auto_save(limb) &&
-        pdcp_time_reached(now_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS)) {
+    if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS)) {
         limb->changed_ms = now_ms; /* if it fails, again after the same time */
         (void)begin_save(limb, arb, now_ms, 0);
     }

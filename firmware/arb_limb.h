@@ -74,6 +74,9 @@ uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_
 /* Is a plan or an action under way? 2307h, 2407h and 2410h wait for its end (D-API-6). */
 bool arb_limb_is_busy(const arb_limb_t *limb);
 
+/* Are there devices, and the start-up is still to come? No action of the host may forestall it. */
+bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb);
+
 /* Begins an action for the host; nothing may be under way. ARB_OK: arb_limb_take_outcome will say how it
  * went. Otherwise an error, and nothing was begun: ARB_ERR_NUMBER, no such configuration; ARB_ERR_VALUE, no
  * such action; ARB_ERR_BUSY, try again. */

@@ -9,11 +9,12 @@
 /* No deadline but that of a controller which is about to leave bus-off. */
 static void forget_deadlines(pdcp_arb_t *arb)
 {
-    const bool recovers = arb->recovery.state == PDCP_BUS_OFF &&
-                          pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_RECOVERY);
+    const bool recovers =
+        arb->recovery.state == PDCP_BUS_OFF && pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_RECOVERY);
     pdcp_timers_init(&arb->bus.timers);
     if (recovers) {
-        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_RECOVERY, arb->recovery.changed_ms + arb->recovery.pause_ms);
+        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_RECOVERY,
+                        arb->recovery.changed_ms + arb->recovery.pause_ms);
     }
 }
 

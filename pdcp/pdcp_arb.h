@@ -140,8 +140,8 @@ void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
  */
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source);
 
-/* Have all links been made or taken away that were to be? A device that does not answer may still be told to be silent
- * (D-BUS-22). */
+/* Have all links been made or taken away that were to be? A device that does not answer may still be told to
+ * be silent (D-BUS-22). */
 bool pdcp_arb_links_settled(const pdcp_arb_t *arb);
 
 /* Is a device being set up? */

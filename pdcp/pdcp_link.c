@@ -42,7 +42,8 @@ static bool is_unconnected(const pdcp_channel_t *input)
     return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
 }
 
-/* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing to be made. */
+/* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing
+ * to be made. */
 static void put_todo(pdcp_link_t *link, pdcp_channel_t *channel, pdcp_todo_t todo)
 {
     if (channel->todo != PDCP_TODO_REMOVE) {

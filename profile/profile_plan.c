@@ -512,7 +512,7 @@ static void bring_back_all(work_t *work)
         for (uint8_t e = 0; e < links->count; e++) {
             if (work->in[e] != PDCP_NONE && work->out[e] != PDCP_NONE &&
                 profile_is_terminal(channel_of(work, work->in[e])) == (pass == 1) &&
-                work->plan->want[work->in[e]] != work->out[e]) {
+                (work->plan->want[work->in[e]] != work->out[e] || links->entries[e].stand_in != PDCP_NONE)) {
                 bring_back(work, e);
             }
         }

@@ -343,8 +343,8 @@ static void on_asked(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input, u
     }
 }
 
-/* The host has taken a link away: it is none of the configuration any more, no plan makes it again, and what requires its
- * input rests. */
+/* The host has taken a link away: it is none of the configuration any more, no plan makes it again, and what
+ * requires its input rests. */
 static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 {
     run->plan.want[input] = PDCP_NONE;
@@ -493,17 +493,20 @@ void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored)
     profile_run_begin(run, arb, stored ? PROFILE_FOR_LOAD : PROFILE_FOR_START, what);
 }
 
-bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
+bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb)
 {
-    if (run->state != PROFILE_WAITING || pdcp_time_before(now_ms, arb->asked_ms + PROFILE_QUIET_MS) ||
-        pdcp_time_before(now_ms, run->stirred_ms + PROFILE_QUIET_MS)) {
-        return false; /* the most frequent answer, and the cheapest */
-    }
     bool any_ready = false;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         any_ready = any_ready || nodes_of(arb)->nodes[i].state == PDCP_NODE_READY;
     }
-    return any_ready && !pdcp_arb_setup_running(arb);
+    return run->state == PROFILE_WAITING && any_ready;
+}
+
+bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
+{
+    return profile_run_is_starting(run, arb) && !pdcp_arb_setup_running(arb) &&
+           pdcp_time_reached(now_ms, arb->asked_ms + PROFILE_QUIET_MS) &&
+           pdcp_time_reached(now_ms, run->stirred_ms + PROFILE_QUIET_MS);
 }
 
 /* --- Carrying a plan out --- */
@@ -564,15 +567,16 @@ static bool unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     return any;
 }
 
-/* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have gone since the
- * plan was made are the next plan's business. */
+/* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have
+ * gone since the plan was made are the next plan's business. */
 static uint8_t next_input(const profile_run_t *run, const pdcp_arb_t *arb)
 {
     uint8_t found = PDCP_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t output = run->plan.want[i];
         const pdcp_channel_t *channel = channel_of(arb, i);
-        if (!profile_is_ready(nodes_of(arb), i, PDCP_INPUT) || !profile_is_ready(nodes_of(arb), output, PDCP_OUTPUT) ||
+        if (!profile_is_ready(nodes_of(arb), i, PDCP_INPUT) ||
+            !profile_is_ready(nodes_of(arb), output, PDCP_OUTPUT) ||
             (channel->link == PDCP_LINK_ACTIVE && channel->feed == output)) {
             continue;
         }

@@ -74,6 +74,9 @@ void profile_run_init(profile_run_t *run, uint32_t now_ms);
 void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
                           const pdcp_event_t *event);
 
+/* Is a device set up, and the start-up still to come? */
+bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb);
+
 /* May the start-up begin: is a device set up, and has there been quiet for PROFILE_QUIET_MS? */
 bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms);
 

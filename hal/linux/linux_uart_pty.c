@@ -31,9 +31,9 @@ typedef struct {
     char *link; /* NULL: none */
 } pty_t;
 
-/* Makes the host's end as a new host expects it: raw, and without bytes that the last one left unread. Not when
- * the new host is there already: it has its own settings, and the bytes may be its answers. The end must be open
- * for that, for a moment. */
+/* Makes the host's end as a new host expects it: raw, and without bytes that the last one left unread. Not
+ * when the new host is there already: it has its own settings, and the bytes may be its answers. The end must
+ * be open for that, for a moment. */
 static bool make_fresh(pty_t *pty)
 {
     int host_end = ioctl(pty->fd, TIOCGPTPEER, O_RDWR | O_NOCTTY | O_CLOEXEC);

@@ -1,4 +1,5 @@
-/* Random lives of a whole limb in virtual time, for test_life.c: what its parts share. One seed is one life. */
+/* Random lives of a whole limb in virtual time, for test_life.c: what its parts share. One seed is one life.
+ */
 #ifndef LIFE_H
 #define LIFE_H
 
@@ -25,12 +26,7 @@ static inline bool life_chance(life_random_t *random, uint32_t percent)
 
 /* --- The host: asks at random, and checks what it is answered (life_host.c) --- */
 
-enum {
-    LIFE_OPEN_MAX = 16,
-    LIFE_STRING_MAX = 8192,
-    LIFE_PIECE_MAX = 512,
-    LIFE_BYTES_MAX = 16384
-};
+enum { LIFE_OPEN_MAX = 16, LIFE_STRING_MAX = 8192, LIFE_PIECE_MAX = 512, LIFE_BYTES_MAX = 16384 };
 
 /* A request without an answer. */
 typedef struct {
@@ -56,11 +52,11 @@ typedef struct {
     uint32_t front_byte; /* end of the first of them, */
     uint32_t front_ms;   /* and since when it is due */
     uint32_t babbled_ms;
-    uint32_t room;     /* bytes that the line takes now */
+    uint32_t room; /* bytes that the line takes now */
     bool reads;
     bool is_open;
-    bool stale;    /* what comes may belong to the host before */
-    uint8_t mask;  /* event stream, confirmed */
+    bool stale;   /* what comes may belong to the host before */
+    uint8_t mask; /* event stream, confirmed */
     uint8_t reference;
     /* The string of configurations that is being written in pieces. */
     uint8_t string[LIFE_STRING_MAX];
@@ -106,7 +102,8 @@ typedef struct {
     uint8_t string[LIFE_STRING_MAX]; /* the newest good copy, found without the arbitrator's code */
     uint16_t len;                    /* 0: there is none */
     uint32_t changes;
-    bool unsure; /* reads have failed: what was written and could not be read back is not there for the arbitrator */
+    bool unsure; /* reads have failed: what was written and could not be read back is not there for the
+                    arbitrator */
 } life_memory_t;
 
 /* Puts itself between the limb and its memory. */

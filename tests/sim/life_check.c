@@ -22,12 +22,22 @@ static void check_counter(uint32_t *before, uint32_t now, const char *what, unsi
 
 void life_check_counters(life_counters_t *counters, const arb_app_t *app, uint32_t now_ms)
 {
-    const uint32_t others[] = {app->api.received,      app->api.sent,          app->api.requests,
-                               app->api.busy,          app->api.unknown,       app->api.rx.garbage,
-                               app->api.rx.bad_sizes,  app->api.rx.bad_crc8s,  app->api.rx.bad_crc16s,
-                               app->api.rx.given_up,   app->api.events.sent,   app->store.failures,
-                               app->limb.config.counters[0], app->limb.config.counters[1],
-                               app->limb.config.counters[2], app->limb.config.counters[3]};
+    const uint32_t others[] = {app->api.received,
+                               app->api.sent,
+                               app->api.requests,
+                               app->api.busy,
+                               app->api.unknown,
+                               app->api.rx.garbage,
+                               app->api.rx.bad_sizes,
+                               app->api.rx.bad_crc8s,
+                               app->api.rx.bad_crc16s,
+                               app->api.rx.given_up,
+                               app->api.events.sent,
+                               app->store.failures,
+                               app->limb.config.counters[0],
+                               app->limb.config.counters[1],
+                               app->limb.config.counters[2],
+                               app->limb.config.counters[3]};
     for (unsigned i = 0; i < PDCP_STAT_COUNT; i++) {
         check_counter(&counters->bus[i], app->arb.bus.stats[i], "bus", i);
     }
@@ -36,7 +46,8 @@ void life_check_counters(life_counters_t *counters, const arb_app_t *app, uint32
     }
     const bool spins = !app->work && (int32_t)(app->next_ms - now_ms) <= 0;
     counters->spins = spins ? counters->spins + 1 : 0;
-    TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(SPINS_MAX, counters->spins, "wants to be called at once, again and again");
+    TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(SPINS_MAX, counters->spins,
+                                      "wants to be called at once, again and again");
 }
 
 /* --- When all is calm --- */
@@ -86,7 +97,8 @@ static bool is_fed(const limb_t *limb, const pdcp_channel_t *output)
 {
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &nodes_of(limb)->channels[i];
-        if (input->node != PDCP_NONE && is_active(input) && &nodes_of(limb)->channels[input->feed] == output) {
+        if (input->node != PDCP_NONE && is_active(input) &&
+            &nodes_of(limb)->channels[input->feed] == output) {
             return true;
         }
     }
@@ -116,7 +128,8 @@ static void check_active(const limb_t *limb, const limb_part_t *part, const pdcp
 {
     const pdcp_channel_t *output = &nodes_of(limb)->channels[input->feed];
     const uint8_t index = input->index;
-    TEST_ASSERT_TRUE_MESSAGE(input->feed < PDCP_CHANNELS_MAX && output->node != PDCP_NONE, "an active link without source");
+    TEST_ASSERT_TRUE_MESSAGE(input->feed < PDCP_CHANNELS_MAX && output->node != PDCP_NONE,
+                             "an active link without source");
     const limb_part_t *feeder = owner_of(limb, output);
     if (feeder->node == NULL || find_channel(limb, feeder, output->index) != output) {
         complain(limb, part, index, "linked to a device that is not there");
@@ -132,7 +145,8 @@ static void check_active(const limb_t *limb, const limb_part_t *part, const pdcp
         there->node_id != output->node_id) {
         complain(limb, part, index, "listens to other node ids");
     }
-    if (!pdcp_identity_equal(&source->identity, &feeder->ini->desc.identity) || source->channel != output->index) {
+    if (!pdcp_identity_equal(&source->identity, &feeder->ini->desc.identity) ||
+        source->channel != output->index) {
         complain(limb, part, index, "names another source");
     }
     if ((source->type != output->type || source->profile != output->profile) && !refuses_types(part, index)) {

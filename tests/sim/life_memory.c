@@ -1,5 +1,5 @@
-/* Reads the memory with code of its own: header, checksum and string as arb_config.h and profile-layer.md 5 describe
- * them. */
+/* Reads the memory with code of its own: header, checksum and string as arb_config.h and profile-layer.md 5
+ * describe them. */
 #include <string.h>
 
 #include "life.h"
@@ -107,7 +107,8 @@ static uint16_t find_newest(const sim_nvm_t *nvm, const uint8_t **string)
 {
     uint16_t sequences[2];
     const uint16_t lens[2] = {read_area(nvm, 0, &sequences[0]), read_area(nvm, 1, &sequences[1])};
-    const bool second = lens[1] != 0 && (lens[0] == 0 || (int16_t)(uint16_t)(sequences[1] - sequences[0]) > 0);
+    const bool second =
+        lens[1] != 0 && (lens[0] == 0 || (int16_t)(uint16_t)(sequences[1] - sequences[0]) > 0);
     *string = &nvm->bytes[AREAS_AT + (second ? AREA_BYTES : 0) + STRING_AT];
     return lens[second ? 1 : 0];
 }
@@ -128,8 +129,8 @@ static int differences(const uint8_t *a, uint16_t a_len, const uint8_t *b, uint1
     return count;
 }
 
-/* A header was written: what is the newest copy now? The host's string as it was sent, or the one before with another, a new
- * or without one configuration. */
+/* A header was written: what is the newest copy now? The host's string as it was sent, or the one before with
+ * another, a new or without one configuration. */
 static void look(life_memory_t *memory)
 {
     const uint8_t *string;
@@ -142,7 +143,8 @@ static void look(life_memory_t *memory)
     TEST_ASSERT_TRUE_MESSAGE(len == 0 || life_memory_is_good(string, len), "a bad string is stored");
     const bool is_hosts = (len == host->string_len && memcmp(string, host->string, len) == 0) ||
                           (len == host->before_len && memcmp(string, host->before, len) == 0);
-    TEST_ASSERT_TRUE_MESSAGE(is_hosts || memory->unsure || differences(memory->string, memory->len, string, len) <= 1,
+    TEST_ASSERT_TRUE_MESSAGE(is_hosts || memory->unsure ||
+                                 differences(memory->string, memory->len, string, len) <= 1,
                              "what is stored nobody has written");
     memcpy(memory->string, string, len);
     memory->len = len;

@@ -1,8 +1,9 @@
-/* Random lives of a whole limb: devices come, go, are reset, refuse and fall silent, the line and the memory fail, another
- * arbitrator appears, the power goes, and a host asks whatever can be asked. Then all is calm, and everything must be in order.
+/* Random lives of a whole limb: devices come, go, are reset, refuse and fall silent, the line and the memory
+ * fail, another arbitrator appears, the power goes, and a host asks whatever can be asked. Then all is calm,
+ * and everything must be in order.
  *
- * test_life [FIRST [COUNT]] lives the lives with the seeds from FIRST on; LIFE_COUNT in the environment is another way to
- * live more of them. */
+ * test_life [FIRST [COUNT]] lives the lives with the seeds from FIRST on; LIFE_COUNT in the environment is
+ * another way to live more of them. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -14,7 +15,7 @@
 enum {
     LIVES = 250,
     STORM_MS = 30000,
-    CALM_MS = 40000,  /* whatever is tried again after a while has been */
+    CALM_MS = 40000, /* whatever is tried again after a while has been */
     WATCH_MS = 2500,
     PARTS_MAX = 8,
     CHANNELS_MAX = 6,
@@ -52,15 +53,26 @@ typedef struct {
 
 static life_t life;
 uint32_t life_now(void);
-uint32_t life_now(void) { return life.ms; }
+uint32_t life_now(void)
+{
+    return life.ms;
+}
 #define LOG(...) (getenv("LIFE_LOG") ? (printf("%6u ", life.ms), printf(__VA_ARGS__), puts("")) : 0)
-static const char *const event_names[] = {"BOUND","READY","SETUP_FAILED","LOST","REFUSED","DUPLICATE","IDENTITIES","LINK","WISH","RESET","FOREIGN","SILENT","STARTED","STATE","REQUEST"};
+static const char *const event_names[] = {"BOUND",     "READY",      "SETUP_FAILED", "LOST",  "REFUSED",
+                                          "DUPLICATE", "IDENTITIES", "LINK",         "WISH",  "RESET",
+                                          "FOREIGN",   "SILENT",     "STARTED",      "STATE", "REQUEST"};
 static void debug_event(void *ctx, uint32_t now_ms, const pdcp_event_t *e)
 {
-    (void)ctx; (void)now_ms;
+    (void)ctx;
+    (void)now_ms;
     const pdcp_nodes_t *n = &life.limb.app.arb.bus.nodes;
-    LOG("event %s node %u (sn %u) channel %u status %d len %u", event_names[e->kind], e->node, e->node < 32 ? n->nodes[e->node].identity.sn : 0, e->channel, e->status, e->len);
-    if (e->kind == PDCP_EVENT_LINK) { const pdcp_channel_t *c = &n->channels[e->channel]; LOG("   link %u.%u <- %u.%u is %u todo %u feed %u", n->nodes[c->node].identity.sn, c->index, c->source.sn, c->source_index, c->link, c->todo, c->feed); }
+    LOG("event %s node %u (sn %u) channel %u status %d len %u", event_names[e->kind], e->node,
+        e->node < 32 ? n->nodes[e->node].identity.sn : 0, e->channel, e->status, e->len);
+    if (e->kind == PDCP_EVENT_LINK) {
+        const pdcp_channel_t *c = &n->channels[e->channel];
+        LOG("   link %u.%u <- %u.%u is %u todo %u feed %u", n->nodes[c->node].identity.sn, c->index,
+            c->source.sn, c->source_index, c->link, c->todo, c->feed);
+    }
 }
 
 static uint32_t first_seed = 1;
@@ -77,7 +89,8 @@ static uint32_t chance(uint32_t below)
 
 /* --- Parts --- */
 
-static int put_channel(char *text, size_t size, int index, bool is_output, bool is_controller, unsigned inputs)
+static int put_channel(char *text, size_t size, int index, bool is_output, bool is_controller,
+                       unsigned inputs)
 {
     static const unsigned set_points[] = {0x1100, 0x1110, 0x1200, 0x1210, 0x1220};
     static const unsigned signals[] = {0x2100, 0x2110, 0x2120, 0x2200, 0x2210};
@@ -90,7 +103,8 @@ static int put_channel(char *text, size_t size, int index, bool is_output, bool 
     } else if (is_set_point || chance(8) == 0) {
         type |= 0x0100;
     }
-    int used = snprintf(text, size, "%s%s %04X %04X", index == 1 ? "" : "; ", is_output ? "out" : "in", type, profile);
+    int used = snprintf(text, size, "%s%s %04X %04X", index == 1 ? "" : "; ", is_output ? "out" : "in", type,
+                        profile);
     if (inputs != 0 && chance(100) < (is_output ? 60 : 12)) {
         used += snprintf(&text[used], size - (size_t)used, ", required = %u", 1 + chance(inputs));
     }
@@ -98,7 +112,8 @@ static int put_channel(char *text, size_t size, int index, bool is_output, bool 
         used += snprintf(&text[used], size - (size_t)used, ", desired = %u", 1 + chance(inputs));
     }
     if (is_output) {
-        used += snprintf(&text[used], size - (size_t)used, ", signal = constant 1, rate_ms = %u", 100 + chance(400));
+        used += snprintf(&text[used], size - (size_t)used, ", signal = constant 1, rate_ms = %u",
+                         100 + chance(400));
     } else if ((type & 0x0100) != 0 && chance(2) == 0) {
         used += snprintf(&text[used], size - (size_t)used, ", terminal_profile = %u", set_points[chance(5)]);
     }
@@ -115,12 +130,14 @@ static void add_part(int number)
     const unsigned inputs = kind == 0 ? chance(2) : 1 + chance(3);
     const unsigned outputs = kind == 2 ? chance(2) : 1 + chance(3);
     for (unsigned i = 1; i <= inputs + outputs; i++) {
-        used += put_channel(&channels[used], sizeof channels - (size_t)used, (int)i, i > inputs, kind == 1, inputs);
+        used += put_channel(&channels[used], sizeof channels - (size_t)used, (int)i, i > inputs, kind == 1,
+                            inputs);
     }
     (void)snprintf(more, sizeof more,
                    "beacon_ms = %u\nack_ms = %u\n[parameter %d 0]\nvalue = x\n[parameter %d 0]\n"
                    "value = a value that is longer than four bytes\ncapacity = 600\n%s",
-                   100 + chance(900), 20 + chance(200), REFUSED, LONG_VALUE, chance(8) == 0 ? "[parameter 8 1]\nvalue = x\n" : "");
+                   100 + chance(900), 20 + chance(200), REFUSED, LONG_VALUE,
+                   chance(8) == 0 ? "[parameter 8 1]\nvalue = x\n" : "");
     LOG("part %d: %s", number + 1, channels);
     (void)limb_add_with(&life.limb, (uint16_t)(number + 1), channels, more);
 }
@@ -156,11 +173,16 @@ static void on_frame(void *ctx, uint64_t time_us, const can_frame_t *frame)
     (void)ctx;
     (void)time_us;
     life.frames++;
-    if (getenv("LIFE_FRAMES") && !(frame->dlc == 1 && (frame->data[0] == 0x0A || frame->data[0]==1))) { char t[40]=""; for (int i = 0; i < frame->dlc; i++) sprintf(t+2*i, "%02X", frame->data[i]); LOG("%03X#%s", frame->id, t); }
+    if (getenv("LIFE_FRAMES") && !(frame->dlc == 1 && (frame->data[0] == 0x0A || frame->data[0] == 1))) {
+        char t[40] = "";
+        for (int i = 0; i < frame->dlc; i++)
+            sprintf(t + 2 * i, "%02X", frame->data[i]);
+        LOG("%03X#%s", frame->id, t);
+    }
     if (life.watching && !life_check_is_calm_frame(&life.limb, frame)) {
         life.strange_frames++;
-        (void)printf("seed %u: a frame in the calm: %03X#%02X%02X%02X%02X, %u bytes\n", (unsigned)life.seed, frame->id,
-                     frame->data[0], frame->data[1], frame->data[2], frame->data[3], frame->dlc);
+        (void)printf("seed %u: a frame in the calm: %03X#%02X%02X%02X%02X, %u bytes\n", (unsigned)life.seed,
+                     frame->id, frame->data[0], frame->data[1], frame->data[2], frame->data[3], frame->dlc);
     }
 }
 
@@ -242,8 +264,8 @@ static node_ini_t *ini_of(int part)
     return life.limb.parts[part].ini;
 }
 
-/* A part refuses one parameter of one channel for a while. Transfer enabled only while it is not, or it could not be told to
- * be silent. */
+/* A part refuses one parameter of one channel for a while. Transfer enabled only while it is not, or it could
+ * not be told to be silent. */
 static void refuse(void)
 {
     const int part = (int)chance((uint32_t)life.limb.count);
@@ -254,7 +276,8 @@ static void refuse(void)
     }
     const uint8_t channel = (uint8_t)(1 + chance(ini_of(part)->desc.channel_count));
     const uint8_t param = (uint8_t)(PDCP_CH_ENABLED + chance(4));
-    if (param == PDCP_CH_ENABLED && (node == NULL || pdcp_device_channel(sim_node_device(node), channel)->enabled)) {
+    if (param == PDCP_CH_ENABLED &&
+        (node == NULL || pdcp_device_channel(sim_node_device(node), channel)->enabled)) {
         return;
     }
     extra->param = param;
@@ -341,8 +364,9 @@ static void meet_another(void)
 static const struct {
     uint8_t weight;
     void (*happens)(void);
-} events[] = {{30, ask},       {12, plug_or_pull}, {6, mute},     {6, refuse},    {3, spoil_line},  {2, black_out},
-              {4, wear_memory}, {2, cut_power},     {4, babble},   {2, turn_deaf}, {2, close_host}, {1, meet_another}};
+} events[] = {{30, ask},       {12, plug_or_pull}, {6, mute},        {6, refuse},
+              {3, spoil_line}, {2, black_out},     {4, wear_memory}, {2, cut_power},
+              {4, babble},     {2, turn_deaf},     {2, close_host},  {1, meet_another}};
 
 static void happen(void)
 {
@@ -513,11 +537,13 @@ static void test_lives(void)
         longest_ms = life.host.longest_ms > longest_ms ? life.host.longest_ms : longest_ms;
         limb_end(&life.limb);
     }
-    (void)printf("%u lives of %u s: %llu frames, %llu requests, %llu of them refused, the slowest answered after %u ms, "
-                 "%llu events, configurations stored %llu times\n",
-                 (unsigned)seeds, (STORM_MS + CALM_MS + WATCH_MS) / 1000, (unsigned long long)frames,
-                 (unsigned long long)asked, (unsigned long long)failed, (unsigned)longest_ms,
-                 (unsigned long long)events_told, (unsigned long long)changes);
+    (void)printf(
+        "%u lives of %u s: %llu frames, %llu requests, %llu of them refused, the slowest answered after %u "
+        "ms, "
+        "%llu events, configurations stored %llu times\n",
+        (unsigned)seeds, (STORM_MS + CALM_MS + WATCH_MS) / 1000, (unsigned long long)frames,
+        (unsigned long long)asked, (unsigned long long)failed, (unsigned)longest_ms,
+        (unsigned long long)events_told, (unsigned long long)changes);
 }
 
 /* --- What lives have shown --- */
@@ -536,7 +562,8 @@ static limb_t *begin_case(void)
     return &limb;
 }
 
-/* The host takes away the link of a required input: what requires it rests, and comes back with it (D-PRO-9). */
+/* The host takes away the link of a required input: what requires it rests, and comes back with it (D-PRO-9).
+ */
 static void test_a_removed_link_is_missed(void)
 {
     limb_t *limb = begin_case();
@@ -558,8 +585,8 @@ static bool lose_all(void *ctx, const can_frame_t *frame)
     return true;
 }
 
-/* A device is lost while what the host has asked for waits for the links: the plan does not insist on a link that cannot be
- * made any more. */
+/* A device is lost while what the host has asked for waits for the links: the plan does not insist on a link
+ * that cannot be made any more. */
 static void test_a_device_goes_while_sole_access_is_enforced(void)
 {
     limb_t *limb = begin_case();
@@ -567,11 +594,13 @@ static void test_a_device_goes_while_sole_access_is_enforced(void)
     const uint8_t place = pdcp_nodes_find(&arb->bus.nodes, &limb->parts[1].ini->desc.identity);
     limb_power_off(limb, 2);
     limb_run_ms(limb, 1000);
-    while (limb->lost.time_us == 0 && !pdcp_time_reached(sim_world_ms(&limb->world), arb->bus.nodes.nodes[2].heard_ms + 1400)) {
+    while (limb->lost.time_us == 0 &&
+           !pdcp_time_reached(sim_world_ms(&limb->world), arb->bus.nodes.nodes[2].heard_ms + 1400)) {
         limb_run_ms(limb, 1);
     }
     limb->world.bus.fault = lose_all;
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(arb, pdcp_nodes_channel(&arb->bus.nodes, place, 1))); /* unanswered: 300 ms */
+    TEST_ASSERT_TRUE(
+        pdcp_arb_disconnect(arb, pdcp_nodes_channel(&arb->bus.nodes, place, 1))); /* unanswered: 300 ms */
     profile_run_begin(&limb->app.limb.run, arb, PROFILE_FOR_ENFORCE, 0);
     sim_world_touch_app(&limb->world);
     limb_run_ms(limb, 400);
@@ -587,11 +616,13 @@ static void test_a_device_goes_while_sole_access_is_enforced(void)
 static bool mute_third(void *ctx, const can_frame_t *frame)
 {
     const limb_t *limb = ctx;
-    return frame->dlc > 1 && frame->id == pdcp_can_id(PDCP_PRIORITY_NORMAL, false, pdcp_device_node_id(sim_node_device(limb->parts[2].node)));
+    return frame->dlc > 1 &&
+           frame->id == pdcp_can_id(PDCP_PRIORITY_NORMAL, false,
+                                    pdcp_device_node_id(sim_node_device(limb->parts[2].node)));
 }
 
-/* A device that beacons and does not answer is told to be silent again and again (D-BUS-22); that must not keep the others
- * from being linked. */
+/* A device that beacons and does not answer is told to be silent again and again (D-BUS-22); that must not
+ * keep the others from being linked. */
 static void test_a_mute_device_holds_up_nobody(void)
 {
     limb_t *limb = begin_case();
@@ -611,6 +642,59 @@ static void test_a_mute_device_holds_up_nobody(void)
     limb_end(limb);
 }
 
+/* An action of the host before the start-up does not take its place: what is stored is loaded all the same.
+ */
+static void test_an_action_does_not_forestall_the_start_up(void)
+{
+    static const arb_action_t actions[] = {ARB_ACTION_AUTOCONFIGURE, ARB_ACTION_CLEAR, ARB_ACTION_ENFORCE,
+                                           ARB_ACTION_REPLACE};
+    limb_t *limb = begin_case();
+    (void)limb_act(limb, ARB_ACTION_SAVE, 0);
+    limb_stop_arbitrator(limb);
+    limb_pull(limb, 0, 2);
+    limb_start_arbitrator(limb);
+    for (unsigned i = 0; i < sizeof actions / sizeof actions[0]; i++) {
+        TEST_ASSERT_EQUAL(0, limb_act(limb, actions[i], 0)); /* no devices */
+    }
+    limb_want(limb, "1.1>2.1 2.2>3.1");
+    limb->ready.time_us = 0;
+    limb_plug(limb, 0, 2);
+    while (limb->ready.time_us == 0) {
+        limb_run_ms(limb, 1);
+    }
+    (void)limb_act(limb, ARB_ACTION_ENFORCE, 0);
+    limb_await(limb, 1000);
+    TEST_ASSERT_EQUAL(1, limb->app.limb.active);
+    limb_end(limb);
+}
+
+/* What was to be saved is forgotten with the limb when another arbitrator takes over. */
+static void test_nothing_is_saved_on_standby(void)
+{
+    limb_t *limb = begin_case();
+    const can_frame_t beacon = {.id = 0x100, .dlc = 1, .data = {PDCP_BEACON}};
+    const uint8_t flags = ARB_FLAGS_FACTORY | ARB_FLAG_AUTO_SAVE;
+    const int port = sim_bus_attach(&limb->world.bus, NULL, NULL);
+    limb_stop_arbitrator(limb);
+    limb_run_ms(limb, 100);
+    limb_start_arbitrator(limb);
+    TEST_ASSERT_EQUAL_HEX16(0x2405, limb_ask(limb, 0x2404, &flags, 1));
+    limb->ready.time_us = 0;
+    limb_pull(limb, 0, 2);
+    limb_plug(limb, 0, 2);
+    while (limb->events[PDCP_EVENT_READY] < 6) {
+        limb_run_ms(limb, 1);
+    }
+    TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(limb, 1, 1, 2, 1)); /* a change that is to be saved */
+    for (int i = 0; i < 8; i++) {
+        TEST_ASSERT_TRUE(sim_bus_send(&limb->world.bus, port, &beacon));
+        limb_run_ms(limb, 1000);
+    }
+    TEST_ASSERT_EQUAL(1, limb->events[PDCP_EVENT_SILENT]);
+    TEST_ASSERT_EQUAL(0, limb->app.limb.config.stored);
+    limb_end(limb);
+}
+
 int main(int argc, char **argv)
 {
     const char *count = getenv("LIFE_COUNT");
@@ -621,6 +705,8 @@ int main(int argc, char **argv)
     if (argc == 1) {
         RUN_TEST(test_a_removed_link_is_missed);
         RUN_TEST(test_a_mute_device_holds_up_nobody);
+        RUN_TEST(test_an_action_does_not_forestall_the_start_up);
+        RUN_TEST(test_nothing_is_saved_on_standby);
         RUN_TEST(test_a_device_goes_while_sole_access_is_enforced);
     }
     RUN_TEST(test_lives);

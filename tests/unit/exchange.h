@@ -5,7 +5,7 @@
 
 #include "arb_app.h"
 
-enum { EXCHANGE_EVENTS = 64 };
+enum { EXCHANGE_EVENTS = 48 };
 
 typedef struct {
     pdcp_arb_t *arb; /* the one that stands alone, of which a program has one, or the one of app */

@@ -56,7 +56,9 @@ static void test_bytes_outside_a_write_keep_their_values(void)
     write_good(nvm, 128, "abcdefgh");
     write_good(nvm, 192, "next page");
     write_good(nvm, 130, "XY");
-    expect(nvm, 127, "\xFF" "abXYefgh\xFF");
+    expect(nvm, 127,
+           "\xFF"
+           "abXYefgh\xFF");
     expect(nvm, 192, "next page");
     (void)nvm_contract_reopen(nvm);
 }
@@ -66,7 +68,9 @@ static void test_a_read_goes_over_pages(void)
     hal_nvm_t *nvm = nvm_contract_open();
     write_good(nvm, 60, "1234");
     write_good(nvm, 64, "5678");
-    expect(nvm, 58, "\xFF\xFF" "12345678\xFF\xFF");
+    expect(nvm, 58,
+           "\xFF\xFF"
+           "12345678\xFF\xFF");
     (void)nvm_contract_reopen(nvm);
 }
 

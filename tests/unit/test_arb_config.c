@@ -601,7 +601,8 @@ static void test_a_memory_that_hangs_ends_the_job(void)
     TEST_ASSERT_EQUAL(0, writes);
 }
 
-/* D-PRO-21: The copy rots while the arbitrator runs: it is not used, and above all not copied under a good CRC. */
+/* D-PRO-21: The copy rots while the arbitrator runs: it is not used, and above all not copied under a good
+ * CRC. */
 static void test_damage_at_run_time_is_noticed(void)
 {
     (void)save(1, 1, 0x5300);

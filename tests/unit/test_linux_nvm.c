@@ -211,9 +211,7 @@ hal_nvm_t *nvm_contract_reopen(hal_nvm_t *nvm)
     return open_good(path);
 }
 
-void nvm_contract_wait(void)
-{
-}
+void nvm_contract_wait(void) {}
 
 int main(void)
 {

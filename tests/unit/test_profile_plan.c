@@ -456,6 +456,17 @@ static void test_an_original_replaces_an_input_that_stands_in(void)
     TEST_ASSERT_EQUAL_UINT8(PDCP_NONE, s.links.entries[0].stand_in);
 }
 
+/* 2.2 comes back as what 2.1 requires. */
+static void test_a_stand_in_goes_whatever_has_brought_the_original_back(void)
+{
+    run("D1 out 1 5000 2110, out 2 5000 2120; D2 in 1 5000 2110 req 2, in 2 5000 2120; D3 in 1 5000 2120",
+        "1.1>2.1 1.2>2.2");
+    lose(2);
+    expect("1.2>3.1");
+    back(2);
+    expect("1.1>2.1 1.2>2.2");
+}
+
 /* The output of a stand-in is wanted back by another input, with sole access. */
 static void test_a_stand_in_gives_up_its_sole_access(void)
 {
@@ -730,11 +741,14 @@ static void test_an_awaited_source_is_not_replaced_for_what_requires_it(void)
     expect("3.1>1.2 1.1>2.1");
 }
 
-static void test_an_input_that_waits_for_its_source_does_not_stand_in(void)
+static void test_a_configured_input_does_not_stand_in_while_a_device_is_awaited(void)
 {
-    run("D1 out 1 5000 2110; D2 in 1 5200 2110; D3 in 1 5200 2110; D4 out 1 5000 2110", "1.1>2.1 4.1>3.1");
+    run("D1 out 1 5000 2110; D2 in 1 5200 2110; D3 in 1 5200 2110; D4 out 1 5000 3110; D5 out 1 5000 1110;"
+        "D6 in 1 5200 1110",
+        "1.1>2.1 4.1>3.1 5.1>6.1");
     lose(2);
-    await(4);
+    lose(4);
+    await(5);
     expect("");
     memset(s.awaited, 0, sizeof s.awaited);
     expect("1.1>3.1");
@@ -961,6 +975,7 @@ int main(void)
     RUN_TEST(test_a_working_link_is_kept_in_spite_of_a_ban);
     RUN_TEST(test_an_original_replaces_an_output_that_stands_in);
     RUN_TEST(test_an_original_replaces_an_input_that_stands_in);
+    RUN_TEST(test_a_stand_in_goes_whatever_has_brought_the_original_back);
     RUN_TEST(test_a_stand_in_gives_up_its_sole_access);
     RUN_TEST(test_a_replacement_that_fits_less_well_is_kept_until_the_original_comes);
     RUN_TEST(test_an_original_that_cannot_hold_replaces_nothing);
@@ -985,7 +1000,7 @@ int main(void)
     RUN_TEST(test_awaited_devices_are_not_replaced);
     RUN_TEST(test_an_awaited_input_is_not_replaced);
     RUN_TEST(test_an_awaited_source_is_not_replaced_for_what_requires_it);
-    RUN_TEST(test_an_input_that_waits_for_its_source_does_not_stand_in);
+    RUN_TEST(test_a_configured_input_does_not_stand_in_while_a_device_is_awaited);
     RUN_TEST(test_a_configured_terminal_channel_is_not_autoconfigured_while_a_device_is_awaited);
     RUN_TEST(test_a_device_that_is_being_set_up_is_awaited);
     RUN_TEST(test_only_what_is_asked_for_is_planned);

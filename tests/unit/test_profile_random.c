@@ -379,12 +379,44 @@ static void check_reasons(void)
     }
 }
 
+/* Takes away what lacks something, until nothing changes, but for what the host has made. */
+static void take_lacking(uint8_t *links)
+{
+    for (bool changed = true; changed;) {
+        changed = false;
+        for (const uint8_t *i = inputs; *i != PDCP_NONE; i++) {
+            const bool left_alone = is_original(links[*i], *i) && s.links.entries[entry_of(*i)].by_host;
+            if (links[*i] != PDCP_NONE && !left_alone && lacks(links, links[*i], *i)) {
+                links[*i] = PDCP_NONE;
+                changed = true;
+            }
+        }
+    }
+}
+
+/* Would an original be lost with the link of this input? */
+static bool costs_an_original(uint8_t input)
+{
+    uint8_t links[PDCP_CHANNELS_MAX];
+    memcpy(links, s.plan.want, sizeof links);
+    links[input] = PDCP_NONE;
+    take_lacking(links);
+    for (const uint8_t *i = inputs; *i != PDCP_NONE; i++) {
+        if (*i != input && links[*i] == PDCP_NONE && is_original(s.plan.want[*i], *i)) {
+            return true;
+        }
+    }
+    return false;
+}
+
 static void check_stand_ins(void)
 {
     for (uint8_t e = 0; e < s.links.count; e++) {
         const uint8_t input = s.links.entries[e].stand_in;
         if (input != PDCP_NONE) {
             check(out_of[e] != PDCP_NONE && s.plan.want[input] == out_of[e], "a stand-in that is none");
+            check(in_of[e] == PDCP_NONE || s.plan.want[in_of[e]] != out_of[e] || costs_an_original(input),
+                  "original and stand-in");
         }
     }
 }
@@ -480,7 +512,7 @@ static void check_originals(void)
 static bool is_awaited(const profile_ref_t *end)
 {
     for (uint8_t p = 0; p < PDCP_DEVICES_MAX; p++) {
-        if (s.nodes.nodes[p].state == PDCP_NODE_LOST && (s.awaited[p / 8] >> (p % 8) & 1u) != 0 &&
+        if (s.nodes.nodes[p].state == PDCP_NODE_LOST && (s.awaited[p / 8] & (1u << (p % 8))) != 0 &&
             pdcp_identity_equal(&s.nodes.nodes[p].identity, &s.links.parts[end->part].identity)) {
             return true;
         }
@@ -756,16 +788,7 @@ static void enforce_naively(uint8_t *links)
             }
         }
     }
-    for (bool changed = true; changed;) {
-        changed = false;
-        for (const uint8_t *i = inputs; *i != PDCP_NONE; i++) {
-            const bool left_alone = is_original(links[*i], *i) && s.links.entries[entry_of(*i)].by_host;
-            if (links[*i] != PDCP_NONE && !left_alone && lacks(links, links[*i], *i)) {
-                links[*i] = PDCP_NONE;
-                changed = true;
-            }
-        }
-    }
+    take_lacking(links);
 }
 
 static void check_enforce(void)

@@ -1,0 +1,504 @@
+#include "ecan1.h"
+
+#include <string.h>
+
+#include "board.h"
+#include "handlers.h"
+#include "part.h"
+#include "ring.h"
+
+/* --- bit timing [PDCP 2.2]: 1 Mbit/s, sampled at 75 to 80 % of the bit --- */
+
+#define CAN_CLOCK BOARD_FCY
+#define BITRATE 1000000uL
+/* A time quantum is 2 * (BRP + 1) clocks, a bit 8 to 25 quanta: the smallest BRP that fits resynchronises
+ * best. */
+#define CLOCK_PAIRS (CAN_CLOCK / 2u / BITRATE)
+#define BRP_PLUS_1 (CLOCK_PAIRS <= 25u ? 1u : CLOCK_PAIRS % 2u == 0 ? 2u : CLOCK_PAIRS % 3u == 0 ? 3u : 5u)
+#define QUANTA (CLOCK_PAIRS / BRP_PLUS_1)
+#define SEGMENT_2 (QUANTA / 4u)
+#define BEFORE_SAMPLE                                                                                        \
+    (QUANTA - 1u - SEGMENT_2) /* propagation and segment 1; one quantum is the synchronisation */
+#define SEGMENT_1 (BEFORE_SAMPLE / 2u)
+#define PROPAGATION (BEFORE_SAMPLE - SEGMENT_1)
+#define JUMP (SEGMENT_2 < 4u ? SEGMENT_2 : 4u)
+
+PART_ASSERT(ecan1_bitrate_exact, BITRATE * 2u * BRP_PLUS_1 * QUANTA == CAN_CLOCK);
+PART_ASSERT(ecan1_quanta_in_range, QUANTA >= 8u && QUANTA <= 25u);
+PART_ASSERT(ecan1_segments_in_range,
+            SEGMENT_1 <= 8u && PROPAGATION <= 8u && SEGMENT_2 >= 2u && SEGMENT_2 <= 8u);
+PART_ASSERT(ecan1_segments_in_proportion, BEFORE_SAMPLE >= SEGMENT_2 && SEGMENT_2 >= JUMP);
+PART_ASSERT(ecan1_sample_point,
+            (QUANTA - SEGMENT_2) * 100u >= QUANTA * 75u && (QUANTA - SEGMENT_2) * 100u <= QUANTA * 80u);
+
+#define CFG1 ((uint16_t)((JUMP - 1u) << 6 | (BRP_PLUS_1 - 1u)))
+#define CFG2 ((uint16_t)((SEGMENT_2 - 1u) << 8 | 0x80u | (SEGMENT_1 - 1u) << 3 | (PROPAGATION - 1u)))
+
+/* --- buffers --- */
+
+enum {
+    BUFFERS = 32,
+    WORDS = 8, /* of one buffer */
+    FIFO_FIRST = 8,
+    PRIORITIES = 4,
+    TX_PLACES = 4, /* of one priority */
+    RX_PLACES = 32,
+    FILTERS_MAX = 8,
+    MODE_NORMAL = 0,
+    MODE_DISABLED = 1,
+    MODE_CONFIGURATION = 4,
+    MODE_WAIT_ROUNDS = 8000, /* of at least 5 cycles: 1 ms; the change takes two bit times */
+    UNUSED = 0xFFFF          /* word 0 of a buffer that holds no frame: its upper bits are always 0 in one */
+};
+
+/* C1INTF, C1INTE */
+enum {
+    INTF_TB = 0x0001,
+    INTF_RB = 0x0002,
+    INTF_RBOV = 0x0004,
+    INTF_FIFO = 0x0008,
+    INTF_ERR = 0x0020,
+    INTF_WAK = 0x0040,
+    INTF_IVR = 0x0080,
+    INTF_RXBP = 0x0800,
+    INTF_TXBP = 0x1000,
+    INTF_TXBO = 0x2000,
+    INTF_FLAGS = INTF_TB | INTF_RB | INTF_RBOV | INTF_FIFO | INTF_ERR | INTF_WAK | INTF_IVR
+};
+
+/* C1TRmnCON, lower half: one buffer a register, the even ones, so that a request is one write of the whole
+ * register and never touches a bit that the controller clears. */
+enum { TX_ENABLE = 0x0080, TX_REQUEST = 0x0008 };
+
+/* A buffer in memory: word 0 = SID10..0 at bit 2, SRR, IDE; word 1 = EID17..6; word 2 = EID5..0 at bit 10,
+ * RTR, DLC; words 3 to 6 = data, LSB first; word 7 = number of the filter. */
+enum { W0_IDE = 0x0001, W0_SRR = 0x0002, W2_RTR = 0x0200, W2_DLC = 0x000F };
+
+static volatile uint16_t ecan1_buffers[BUFFERS][WORDS] PART_DMA_MEMORY(512);
+
+struct hal_can {
+    ring_t rx_ring;
+    ring_t tx_rings[PRIORITIES];
+    volatile bool loaded[PRIORITIES]; /* the buffer of this priority holds the first frame of its queue */
+    uint8_t refused;                  /* priority of the frame that was refused last; PRIORITIES: none was */
+    bool down;
+    volatile bool held; /* bus-off, until the restart */
+    volatile uint8_t errors_seen;
+    uint8_t errors_told;
+    volatile uint32_t rx_overruns;
+    volatile uint32_t tx_failed;
+    uint8_t filter_count;
+    hal_can_filter_t filters[FILTERS_MAX];
+    can_frame_t rx_frames[RX_PLACES];
+    can_frame_t tx_frames[PRIORITIES][TX_PLACES];
+};
+
+static struct hal_can ecan1;
+
+/* --- set-up --- */
+
+static bool enter_configuration(void)
+{
+    uint16_t rounds = MODE_WAIT_ROUNDS;
+    C1CTRL1bits.REQOP = MODE_CONFIGURATION;
+    while (C1CTRL1bits.OPMODE != MODE_CONFIGURATION) {
+        if (--rounds == 0) {
+            return false;
+        }
+    }
+    return true;
+}
+
+/* Peripheral indirect: the controller says which buffer, the buffers' common address has zeros in those bits.
+ */
+static void start_dma(void)
+{
+    PART_DMA_CLEAR_ERRORS();
+    DMA0CON = 0x0020; /* words, peripheral to RAM, peripheral indirect, continuous */
+    DMA0PAD = (uint16_t)(uintptr_t)&C1RXD;
+    DMA0CNT = WORDS - 1;
+    DMA0REQ = 0x0022;
+    PART_DMA0_START(ecan1_buffers);
+    DMA0CONbits.CHEN = 1;
+    DMA1CON = 0x2020; /* the same, RAM to peripheral */
+    DMA1PAD = (uint16_t)(uintptr_t)&C1TXD;
+    DMA1CNT = WORDS - 1;
+    DMA1REQ = 0x0046;
+    PART_DMA1_START(ecan1_buffers);
+    DMA1CONbits.CHEN = 1;
+}
+
+/* Filter 0 with mask 0 takes every frame of either kind into the FIFO. Filters of the controller see no
+ * remote bit, so they cannot let all remote frames through, as hal_can.h wants it: filtering is done in
+ * hal_can_receive. */
+static void accept_all(void)
+{
+    C1CTRL1bits.WIN = 1;
+    C1FMSKSEL1 = 0;
+    C1RXM0SID = 0; /* no bit is compared, MIDE = 0: base and extended */
+    C1RXM0EID = 0;
+    C1RXF0SID = 0;
+    C1RXF0EID = 0;
+    C1BUFPNT1 = 0x000F; /* to the FIFO */
+    C1CTRL1bits.WIN = 0;
+    C1FEN1 = 0x0001;
+}
+
+/* Byte by byte, the start of the FIFO first: the larger part takes no word here. */
+static void set_fifo(void)
+{
+    volatile uint8_t *halves = (volatile uint8_t *)&C1FCTRL;
+    halves[0] = FIFO_FIRST;
+    halves = (volatile uint8_t *)&C1FCTRL;
+    halves[1] = 0xC0; /* DMABS = 6: 32 buffers */
+}
+
+static void clear_flags(void)
+{
+    C1RXFUL1 = 0;
+    C1RXFUL2 = 0;
+    C1RXOVF1 = 0;
+    C1RXOVF2 = 0;
+    C1INTF = 0;
+}
+
+hal_can_t *ecan1_open(void)
+{
+    IEC2bits.C1IE = 0;
+    memset(&ecan1, 0, sizeof ecan1);
+    ecan1.refused = PRIORITIES;
+    if (!enter_configuration()) {
+        ecan1.down = true;
+        return &ecan1;
+    }
+    C1CTRL1bits.CANCKS = PART_CAN_CANCKS;
+    C1CFG1 = CFG1;
+    C1CFG2 = CFG2;
+    set_fifo();
+    accept_all();
+    for (uint8_t i = 0; i < BUFFERS; i++) {
+        ecan1_buffers[i][0] = UNUSED;
+    }
+    start_dma();
+    C1TR01CON = TX_ENABLE | 3; /* the lower half's buffer, priority 3 to 0 */
+    C1TR23CON = TX_ENABLE | 2;
+    C1TR45CON = TX_ENABLE | 1;
+    C1TR67CON = TX_ENABLE;
+    clear_flags();
+    C1INTE = INTF_TB | INTF_RB | INTF_RBOV | INTF_ERR | INTF_IVR;
+    IPC8bits.C1IP = PART_LEVEL_CAN;
+    IFS2bits.C1IF = 0;
+    IEC2bits.C1IE = 1;
+    C1CTRL1bits.REQOP = MODE_NORMAL; /* entered after 11 recessive bits, however long they take */
+    return &ecan1;
+}
+
+/* --- out --- */
+
+static void request(uint8_t priority)
+{
+    switch (priority) {
+    case 0:
+        C1TR01CON = TX_ENABLE | TX_REQUEST | 3;
+        break;
+    case 1:
+        C1TR23CON = TX_ENABLE | TX_REQUEST | 2;
+        break;
+    case 2:
+        C1TR45CON = TX_ENABLE | TX_REQUEST | 1;
+        break;
+    default:
+        C1TR67CON = TX_ENABLE | TX_REQUEST;
+        break;
+    }
+}
+
+static bool requested(uint8_t priority)
+{
+    const uint16_t control = priority == 0   ? C1TR01CON
+                             : priority == 1 ? C1TR23CON
+                             : priority == 2 ? C1TR45CON
+                                             : C1TR67CON;
+    return (control & TX_REQUEST) != 0;
+}
+
+static void load(uint8_t priority)
+{
+    const ring_t *ring = &ecan1.tx_rings[priority];
+    const can_frame_t *frame = &ecan1.tx_frames[priority][ring_place(ring->tail, TX_PLACES)];
+    volatile uint16_t *words = ecan1_buffers[priority * 2];
+    words[0] = (uint16_t)(frame->id << 2);
+    words[1] = 0;
+    words[2] = frame->dlc;
+    for (uint8_t i = 0; i < 4; i++) {
+        words[3 + i] = (uint16_t)(frame->data[2 * i] | (uint16_t)frame->data[2 * i + 1] << 8);
+    }
+    ecan1.loaded[priority] = true;
+    request(priority);
+}
+
+/* Takes the frames that have left out of their queues and loads the next ones. From the handler, or with it
+ * off. */
+static void advance_tx(void)
+{
+    for (uint8_t priority = 0; priority < PRIORITIES; priority++) {
+        ring_t *ring = &ecan1.tx_rings[priority];
+        if (ecan1.loaded[priority] && !requested(priority)) {
+            ecan1.loaded[priority] = false;
+            ring->tail++;
+        }
+        if (!ecan1.loaded[priority] && ring_count(ring) != 0) {
+            load(priority);
+        }
+    }
+}
+
+bool hal_can_send(hal_can_t *can, const can_frame_t *frame)
+{
+    const uint8_t priority = (uint8_t)(frame->id >> 9);
+    ring_t *ring = &can->tx_rings[priority];
+    if (can->down || can->held || ring_count(ring) == TX_PLACES) {
+        can->refused = priority;
+        return false;
+    }
+    can->refused = PRIORITIES;
+    can->tx_frames[priority][ring_place(ring->head, TX_PLACES)] = *frame;
+    unsigned int saved;
+    PART_LOCK(saved);
+    if (!can->held) {
+        ring->head++;
+        if (!can->loaded[priority]) {
+            load(priority);
+        }
+    }
+    PART_UNLOCK(saved);
+    return true;
+}
+
+/* --- in --- */
+
+static bool is_full(uint8_t buffer)
+{
+    const uint16_t flags = buffer < 16 ? C1RXFUL1 : C1RXFUL2;
+    return (flags >> (buffer & 15u) & 1u) != 0;
+}
+
+/* The flags are cleared by writing 0; a 1 leaves them alone. */
+static void release(uint8_t buffer)
+{
+    const uint16_t others = (uint16_t) ~(1u << (buffer & 15u));
+    if (buffer < 16) {
+        C1RXFUL1 = others;
+    } else {
+        C1RXFUL2 = others;
+    }
+}
+
+static void read_frame(const volatile uint16_t *words, can_frame_t *frame)
+{
+    const uint8_t dlc = (uint8_t)(words[2] & W2_DLC);
+    frame->dlc = dlc > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : dlc;
+    for (uint8_t i = 0; i < 4; i++) {
+        const uint16_t word = words[3 + i];
+        frame->data[2 * i] = (uint8_t)word;
+        frame->data[2 * i + 1] = (uint8_t)(word >> 8);
+    }
+    frame->id = 0;
+    if ((words[0] & W0_IDE) != 0) {
+        frame->kind = (words[2] & W2_RTR) != 0 ? CAN_FRAME_REMOTE : CAN_FRAME_EXTENDED;
+    } else if ((words[0] & W0_SRR) != 0) {
+        frame->kind = CAN_FRAME_REMOTE;
+    } else {
+        frame->kind = CAN_FRAME_BASE;
+        frame->id = (uint16_t)(words[0] >> 2);
+    }
+}
+
+static void take_buffer(uint8_t buffer)
+{
+    volatile uint16_t *words = ecan1_buffers[buffer];
+    ring_t *ring = &ecan1.rx_ring;
+    if (words[0] == UNUSED || ring_count(ring) == RX_PLACES) {
+        ecan1.rx_overruns++;
+    } else {
+        read_frame(words, &ecan1.rx_frames[ring_place(ring->head, RX_PLACES)]);
+        ring->head++;
+    }
+    words[0] = UNUSED;
+    release(buffer);
+}
+
+/* The next full buffer from this one on; BUFFERS: there is none. After an overflow the controller's pointer
+ * may stand at an empty one. */
+static uint8_t next_full(uint8_t buffer)
+{
+    if (((C1RXFUL1 >> FIFO_FIRST) | C1RXFUL2) == 0) {
+        return BUFFERS;
+    }
+    for (uint8_t i = 0; i < BUFFERS - FIFO_FIRST; i++) {
+        if (is_full(buffer)) {
+            return buffer;
+        }
+        buffer = buffer == BUFFERS - 1 ? FIFO_FIRST : (uint8_t)(buffer + 1);
+    }
+    return BUFFERS;
+}
+
+static void drain_fifo(void)
+{
+    uint8_t buffer = next_full((uint8_t)C1FIFObits.FNRB);
+    while (buffer != BUFFERS) {
+        take_buffer(buffer);
+        buffer = next_full((uint8_t)C1FIFObits.FNRB);
+    }
+}
+
+static uint8_t count_bits(uint16_t bits)
+{
+    uint8_t count = 0;
+    for (; bits != 0; bits &= (uint16_t)(bits - 1u)) {
+        count++;
+    }
+    return count;
+}
+
+static void count_overflows(void)
+{
+    const uint16_t low = C1RXOVF1;
+    const uint16_t high = C1RXOVF2;
+    C1RXOVF1 = (uint16_t)~low;
+    C1RXOVF2 = (uint16_t)~high;
+    ecan1.rx_overruns += (uint16_t)(count_bits(low) + count_bits(high));
+}
+
+static bool passes(const hal_can_t *can, const can_frame_t *frame)
+{
+    if (can->filter_count == 0 || frame->kind != CAN_FRAME_BASE) {
+        return true;
+    }
+    for (uint8_t i = 0; i < can->filter_count; i++) {
+        if ((frame->id & can->filters[i].mask) == can->filters[i].id) {
+            return true;
+        }
+    }
+    return false;
+}
+
+size_t hal_can_receive(hal_can_t *can, can_frame_t *frames, size_t max)
+{
+    size_t count = 0;
+    while (count < max && ring_count(&can->rx_ring) != 0) {
+        frames[count] = can->rx_frames[ring_place(can->rx_ring.tail, RX_PLACES)];
+        can->rx_ring.tail++;
+        if (passes(can, &frames[count])) {
+            count++;
+        }
+    }
+    while (count < max && can->errors_told != can->errors_seen) {
+        can->errors_told++;
+        memset(&frames[count], 0, sizeof frames[count]);
+        frames[count].kind = CAN_FRAME_ERROR;
+        count++;
+    }
+    return count;
+}
+
+void hal_can_set_filters(hal_can_t *can, const hal_can_filter_t *filters, size_t n)
+{
+    can->filter_count = n > FILTERS_MAX ? 0 : (uint8_t)n;
+    if (can->filter_count != 0) {
+        memcpy(can->filters, filters, n * sizeof filters[0]);
+    }
+}
+
+bool ecan1_has_work(const hal_can_t *can)
+{
+    if (ring_count(&can->rx_ring) != 0 || can->errors_told != can->errors_seen) {
+        return true;
+    }
+    return can->refused != PRIORITIES && !can->held && !can->down &&
+           ring_count(&can->tx_rings[can->refused]) < TX_PLACES;
+}
+
+/* --- errors --- */
+
+/* The transmit buffers are taken back before the queues are emptied: nothing of them may leave after a
+ * restart. */
+static void hold_off(void)
+{
+    ecan1.held = true;
+    C1TR01CON = TX_ENABLE | 3;
+    C1TR23CON = TX_ENABLE | 2;
+    C1TR45CON = TX_ENABLE | 1;
+    C1TR67CON = TX_ENABLE;
+    C1CTRL1bits.REQOP = MODE_DISABLED; /* keeps the error counters */
+    for (uint8_t priority = 0; priority < PRIORITIES; priority++) {
+        ring_t *ring = &ecan1.tx_rings[priority];
+        ecan1.tx_failed += ring_count(ring);
+        ring->tail = ring->head;
+        ecan1.loaded[priority] = false;
+    }
+}
+
+void hal_can_restart(hal_can_t *can)
+{
+    unsigned int saved;
+    PART_LOCK(saved);
+    if (can->held) {
+        can->held = false;
+        C1CTRL1bits.REQOP = MODE_NORMAL;
+    }
+    PART_UNLOCK(saved);
+}
+
+/* Two words that the handler changes: read until two readings agree. */
+static uint32_t read_counter(const volatile uint32_t *counter)
+{
+    uint32_t first;
+    uint32_t second = *counter;
+    do {
+        first = second;
+        second = *counter;
+    } while (first != second);
+    return first;
+}
+
+hal_can_health_t hal_can_health(const hal_can_t *can)
+{
+    const uint16_t flags = C1INTF;
+    const uint16_t counters = C1EC;
+    hal_can_health_t health = {.state = HAL_CAN_ACTIVE,
+                               .tx_errors = (uint8_t)(counters >> 8),
+                               .rx_errors = (uint8_t)counters,
+                               .rx_overruns = read_counter(&can->rx_overruns),
+                               .tx_failed = read_counter(&can->tx_failed)};
+    if (can->down) {
+        health.state = HAL_CAN_DOWN;
+    } else if (can->held || (flags & INTF_TXBO) != 0) {
+        health.state = HAL_CAN_BUS_OFF;
+    } else if ((flags & (INTF_TXBP | INTF_RXBP)) != 0) {
+        health.state = HAL_CAN_PASSIVE;
+    }
+    return health;
+}
+
+/* Flags are cleared before the work they stand for: what comes during the work sets them again. */
+void PART_HANDLER _C1Interrupt(void)
+{
+    IFS2bits.C1IF = 0;
+    const uint16_t flags = C1INTF & INTF_FLAGS;
+    C1INTF = (uint16_t)~flags;
+    if ((flags & INTF_RBOV) != 0) {
+        count_overflows();
+    }
+    drain_fifo();
+    if ((flags & INTF_IVR) != 0 && (uint8_t)(ecan1.errors_seen - ecan1.errors_told) != UINT8_MAX) {
+        ecan1.errors_seen++;
+    }
+    if ((flags & INTF_ERR) != 0 && (C1INTF & INTF_TXBO) != 0 && !ecan1.held) {
+        hold_off();
+    }
+    if (!ecan1.held) {
+        advance_tx();
+    }
+}

@@ -1,0 +1,51 @@
+/* The part that is built for. All that differs between the parts stands in the one header that this one
+ * includes; what they have in common is used by the drivers under the register names of the vendor's headers.
+ */
+#ifndef PART_H
+#define PART_H
+
+#include <xc.h>
+
+#include <stdint.h>
+
+#if defined(__dsPIC33FJ64MC802__)
+#include "part_fj64mc802.h"
+#elif defined(__dsPIC33EP512MU810__)
+#include "part_ep512mu810.h"
+#else
+#error "no header for this part: add one beside part_fj64mc802.h"
+#endif
+
+/* An interrupt handler. None reads constants, which stand in flash, so none needs the window to flash. */
+#define PART_HANDLER __attribute__((interrupt, no_auto_psv))
+
+/* RAM that a reset leaves alone. */
+#define PART_KEPT __attribute__((persistent))
+
+/* Restarts the program; all of RAM that is PART_KEPT stays. */
+#ifndef PART_RESET
+#define PART_RESET() __asm__ volatile("reset")
+#endif
+
+/* C99 has no static assertion: a negative array size does not compile. */
+#define PART_ASSERT(name, condition) typedef char name[(condition) ? 1 : -1]
+
+/* The priorities of the handlers, 7 the most urgent. How long the hardware waits before something is lost:
+ * the controller for 24 frames, 1.1 ms at the shortest; the UART for 4 bytes, 312 us at 128000 baud; the tick
+ * for 1 ms; the others for ever. */
+enum {
+    PART_LEVEL_CAN = 5,
+    PART_LEVEL_UART_RX = 6,
+    PART_LEVEL_TICK = 4,
+    PART_LEVEL_UART_TX = 3,
+    PART_LEVEL_I2C = 2,
+    PART_LEVEL_ALL = 7 /* as the processor's own level: no handler runs */
+};
+
+/* Runs no handler from here to PART_UNLOCK; nests. A handler that becomes due meanwhile runs afterwards.
+ * saved is an unsigned int of the caller's. Clearing an enable bit would not do: a handler that is just
+ * becoming due still runs. */
+#define PART_LOCK(saved) SET_AND_SAVE_CPU_IPL(saved, PART_LEVEL_ALL)
+#define PART_UNLOCK(saved) RESTORE_CPU_IPL(saved)
+
+#endif

@@ -1,0 +1,76 @@
+/* dsPIC33EP512MU810: 512 KB flash (175104 instructions of 24 bits), 52 KB RAM, 60 MIPS up to 125 degrees
+ * (DS70616). */
+#ifndef PART_EP512MU810_H
+#define PART_EP512MU810_H
+
+#include <stdbool.h>
+
+#define PART_FCY_MAX 60000000uL
+#define PART_PLL_IN_MIN 800000uL
+#define PART_PLL_IN_MAX 8000000uL
+#define PART_PLL_VCO_MIN 120000000uL
+#define PART_PLL_VCO_MAX 340000000uL
+
+/* ECAN is clocked with the instruction rate: CANCKS = 0 here, the other way round than in the smaller part.
+ */
+#define PART_CAN_CANCKS 0
+
+/* DMA reaches all of RAM. The dual-ported RAM at D000h would save it waiting, but the processor sees it
+ * through a page register only: buffers stand below 8000h. */
+#define PART_DMA_MEMORY(alignment) __attribute__((space(xmemory), aligned(alignment)))
+#define PART_DMA0_START(buffer) (DMA0STAL = (uint16_t)(uintptr_t)(buffer), DMA0STAH = 0)
+#define PART_DMA1_START(buffer) (DMA1STAL = (uint16_t)(uintptr_t)(buffer), DMA1STAH = 0)
+#define PART_DMA_CLEAR_ERRORS() (DMAPWC = 0, DMARQC = 0)
+
+/* SCL period = (BRG + 2) / FCY + 120 ns; where the module counts half periods, as later manuals of the family
+ * have it, the bus runs at half the rate, which all devices on it bear. */
+#define PART_I2C_BRG(fcy, scl) ((uint16_t)((fcy) / (scl) - (fcy) / 8333333uL - 2u))
+
+/* Two traps more than the smaller part has. */
+#define PART_GENERIC_TRAPS 1
+
+/* Program flash: a page of 1024 instructions, two instructions are programmed together. */
+#define PART_FLASH_PAGE 0x800uL
+#define PART_FLASH_ERASE_US 22900u
+#define PART_FLASH_PAIR_US 52u
+#define PART_FLASH_STORE_AT 0x40000uL
+#define PART_FLASH_STORE_PAGES 15u
+#define PART_SERIAL_AT 0x54800uL
+
+/* Erratum: while the processor stands still for a flash operation no interrupt may be enabled. */
+static inline bool part_flash_run(void)
+{
+    const uint16_t enabled = INTCON2bits.GIE;
+    INTCON2bits.GIE = 0;
+    __builtin_disi(6);
+    __builtin_write_NVM();
+    while (NVMCONbits.WR) {
+    }
+    const bool good = !NVMCONbits.WRERR;
+    NVMCON = 0;
+    INTCON2bits.GIE = enabled & 1u;
+    return good;
+}
+
+static inline bool part_flash_erase(uint32_t address)
+{
+    NVMADRU = (uint16_t)(address >> 16);
+    NVMADR = (uint16_t)address;
+    NVMCON = 0x4003;
+    return part_flash_run();
+}
+
+static inline bool part_flash_pair(uint32_t address, uint32_t first, uint32_t second)
+{
+    TBLPAG = 0xFA; /* the write latches */
+    __builtin_tblwtl(0, (uint16_t)first);
+    __builtin_tblwth(0, (uint16_t)(first >> 16));
+    __builtin_tblwtl(2, (uint16_t)second);
+    __builtin_tblwth(2, (uint16_t)(second >> 16));
+    NVMADRU = (uint16_t)(address >> 16);
+    NVMADR = (uint16_t)address;
+    NVMCON = 0x4001;
+    return part_flash_run();
+}
+
+#endif

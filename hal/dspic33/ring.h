@@ -1,0 +1,26 @@
+/* Places in a ring for one writer and one reader, of which either may be an interrupt handler. head counts
+ * what was put in, tail what was taken out; both wrap, so that all places can be used. The capacity is a
+ * power of two of at most 128. The writer fills the place before it moves head; the reader empties it before
+ * it moves tail. */
+#ifndef RING_H
+#define RING_H
+
+#include <stdint.h>
+
+typedef struct {
+    volatile uint8_t head; /* written by the writer alone */
+    volatile uint8_t tail; /* written by the reader alone */
+} ring_t;
+
+static inline uint8_t ring_count(const ring_t *ring)
+{
+    return (uint8_t)(ring->head - ring->tail);
+}
+
+/* The place of the entry that head or tail stands for. */
+static inline uint8_t ring_place(uint8_t counter, uint8_t capacity)
+{
+    return (uint8_t)(counter & (capacity - 1u));
+}
+
+#endif

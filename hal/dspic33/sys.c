@@ -1,0 +1,122 @@
+#include "sys.h"
+
+#include <stddef.h>
+
+#include "hal_clock.h"
+#include "part.h"
+
+enum { FAULT_MAGIC = 0x5F0D };
+
+/* RCON */
+enum {
+    RCON_POR = 0x0001,
+    RCON_BOR = 0x0002,
+    RCON_WDTO = 0x0010,
+    RCON_SWR = 0x0040,
+    RCON_EXTR = 0x0080,
+    RCON_IOPUWR = 0x4000,
+    RCON_TRAPR = 0x8000,
+    RCON_SLEEP_IDLE = 0x000C,
+    RCON_CAUSES = RCON_POR | RCON_BOR | RCON_WDTO | RCON_SWR | RCON_EXTR | RCON_IOPUWR | RCON_TRAPR
+};
+
+static sys_fault_t sys_last_fault PART_KEPT;
+static uint16_t
+    sys_noise[16] PART_KEPT; /* after power-on, what RAM cells fall to: another pattern in each part */
+
+static sys_reset_t sys_cause;
+static bool sys_faulted;
+static uint32_t sys_kicked_ms;
+
+/* Two instructions at the end of flash, written by the programmer (tools/flash --serial); erased: no number.
+ */
+static const uint16_t sys_serial_words[2]
+    __attribute__((space(prog), address(PART_SERIAL_AT), noload, unused));
+
+void sys_start(void)
+{
+    const uint16_t flags = RCON;
+    RCON = flags & (uint16_t) ~(RCON_CAUSES | RCON_SLEEP_IDLE);
+    if ((flags & RCON_POR) != 0) {
+        sys_last_fault.magic = 0;
+    }
+    if (sys_last_fault.magic != FAULT_MAGIC) {
+        sys_last_fault = (sys_fault_t){.magic = FAULT_MAGIC};
+    }
+    sys_faulted = sys_last_fault.kind != SYS_FAULT_NONE && (flags & RCON_SWR) != 0;
+    if (sys_faulted || (flags & RCON_TRAPR) != 0) {
+        sys_cause = SYS_RESET_TRAP;
+    } else if ((flags & RCON_POR) != 0) {
+        sys_cause = SYS_RESET_POWER_ON;
+    } else if ((flags & RCON_BOR) != 0) {
+        sys_cause = SYS_RESET_BROWN_OUT;
+    } else if ((flags & RCON_WDTO) != 0) {
+        sys_cause = SYS_RESET_WATCHDOG;
+    } else if ((flags & RCON_IOPUWR) != 0) {
+        sys_cause = SYS_RESET_ILLEGAL;
+    } else {
+        sys_cause = (flags & RCON_SWR) != 0 ? SYS_RESET_SOFTWARE : SYS_RESET_PIN;
+    }
+}
+
+sys_reset_t sys_reset_cause(void)
+{
+    return sys_cause;
+}
+
+const sys_fault_t *sys_fault(void)
+{
+    return sys_faulted ? &sys_last_fault : NULL;
+}
+
+void sys_fail(sys_fault_kind_t kind)
+{
+    sys_last_fault.kind = (uint16_t)kind;
+    sys_last_fault.flags = INTCON1;
+    sys_last_fault.count++;
+    PART_RESET();
+}
+
+void sys_kick(uint32_t now_ms)
+{
+    if (now_ms != sys_kicked_ms) {
+        sys_kicked_ms = now_ms;
+        ClrWdt();
+    }
+}
+
+/* An enabled interrupt ends the idle state also while its handler may not run; it runs after PART_UNLOCK. */
+void sys_idle(bool (*has_work)(void *ctx), void *ctx)
+{
+    unsigned int saved;
+    PART_LOCK(saved);
+    if (!has_work(ctx)) {
+        Idle();
+    }
+    PART_UNLOCK(saved);
+}
+
+/* FNV-1a over the noise; stirred on each call, so that it never gives the same number twice. */
+static uint32_t draw(void)
+{
+    uint32_t hash = 2166136261uL;
+    sys_noise[0]++;
+    sys_noise[1] ^= TMR1;
+    sys_noise[2] ^= (uint16_t)hal_clock_ms();
+    for (uint8_t i = 0; i < 16; i++) {
+        hash = (hash ^ (sys_noise[i] & 0xFFu)) * 16777619uL;
+        hash = (hash ^ sys_noise[i] >> 8) * 16777619uL;
+    }
+    sys_noise[3] ^= (uint16_t)hash;
+    return hash;
+}
+
+uint32_t hal_sys_serial(void)
+{
+    (void)sys_serial_words;
+    TBLPAG = (uint16_t)(PART_SERIAL_AT >> 16);
+    const uint16_t low = __builtin_tblrdl((uint16_t)PART_SERIAL_AT);
+    const uint16_t high = __builtin_tblrdl((uint16_t)PART_SERIAL_AT + 2u);
+    const uint32_t serial = (uint32_t)high << 16 | low;
+    return serial != 0xFFFFFFFFuL ? serial : draw();
+}

@@ -1,0 +1,61 @@
+/* Reset, watchdog, idle, serial number (hal_sys.h). */
+#ifndef SYS_H
+#define SYS_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "hal_sys.h"
+
+/* Why the program starts, the gravest first. */
+typedef enum {
+    SYS_RESET_TRAP = 0,     /* a trap, see sys_fault; or two at once */
+    SYS_RESET_WATCHDOG = 1, /* the main loop or the tick hung */
+    SYS_RESET_ILLEGAL = 2,  /* illegal instruction */
+    SYS_RESET_SOFTWARE = 3,
+    SYS_RESET_PIN = 4,
+    SYS_RESET_BROWN_OUT = 5,
+    SYS_RESET_POWER_ON = 6
+} sys_reset_t;
+
+/* What stopped the program before the last restart. */
+typedef enum {
+    SYS_FAULT_NONE = 0,
+    SYS_FAULT_OSCILLATOR = 1, /* the crystal has failed */
+    SYS_FAULT_ADDRESS = 2,
+    SYS_FAULT_STACK = 3,
+    SYS_FAULT_MATH = 4,
+    SYS_FAULT_DMA = 5,
+    SYS_FAULT_OTHER = 6,   /* hard or soft trap of the EP part */
+    SYS_FAULT_HANDLER = 7, /* an interrupt that nobody handles */
+    SYS_FAULT_CRYSTAL = 8  /* the crystal did not start */
+} sys_fault_kind_t;
+
+/* Stays in RAM over resets, not over power-off. */
+typedef struct {
+    uint16_t magic; /* else this is what RAM holds after power-on */
+    uint16_t kind;  /* sys_fault_kind_t */
+    uint16_t flags; /* INTCON1 at that time */
+    uint16_t count; /* faults since power-on */
+} sys_fault_t;
+
+/* First of all: finds out why the program starts. */
+void sys_start(void);
+
+sys_reset_t sys_reset_cause(void);
+
+/* The last fault before this start; NULL: the reset had another cause. */
+const sys_fault_t *sys_fault(void);
+
+/* Writes down what happened and restarts. Any context. Does not return. */
+void sys_fail(sys_fault_kind_t kind);
+
+/* Keeps the watchdog (2 s) quiet, if the clock has moved on since the last call: a main loop without a tick
+ * is no healthy one. Called once in each turn of the main loop, and nowhere else. */
+void sys_kick(uint32_t now_ms);
+
+/* Stops the processor until the next interrupt, the tick at the latest, unless there is work already.
+ * has_work is called with all handlers off, so that nothing comes between its answer and the stop. */
+void sys_idle(bool (*has_work)(void *ctx), void *ctx);
+
+#endif

@@ -120,7 +120,7 @@ static uint8_t write_configs(arb_call_t *call)
         return ARB_PENDING;
     }
     if (turn->status >= 0 && offset + (uint32_t)len == total) {
-        arb_limb_on_written(limb);
+        arb_limb_on_written(limb, call->arb);
     }
     return error_of_config(call, turn->status);
 }

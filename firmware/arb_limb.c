@@ -79,11 +79,19 @@ static void set_active(arb_limb_t *limb, uint8_t number)
     limb->told = false;
 }
 
-void arb_limb_on_written(arb_limb_t *limb)
+/* The active configuration is not stored any more: what the devices name counts again. */
+static void forget_active(arb_limb_t *limb, pdcp_arb_t *arb)
+{
+    set_active(limb, 0);
+    limb->run.stored = false;
+    pdcp_arb_plan_links(arb, false);
+}
+
+void arb_limb_on_written(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     limb->told = false;
     if (limb->active != 0 && !arb_config_has(&limb->config, limb->active)) {
-        set_active(limb, 0);
+        forget_active(limb, arb);
     }
 }
 
@@ -353,9 +361,7 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
     if (limb->status >= 0) {
         limb->told = false;
         if (limb->active == limb->number) {
-            set_active(limb, 0);
-            limb->run.stored = false;
-            pdcp_arb_plan_links(arb, false);
+            forget_active(limb, arb);
         }
     }
     end(limb, error_of((arb_config_status_t)limb->status), 0);
@@ -421,15 +427,13 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
 
 void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms, const pdcp_event_t *event)
 {
-    profile_run_on_event(&limb->run, arb, now_ms, event);
-    if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb, and nothing of it to be saved */
+    if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb */
         set_active(limb, 0);
-        (void)profile_run_take_change(&limb->run);
-        limb->unsaved = false;
         if (limb->stage == STAGE_PLAN) { /* what the memory is doing goes on */
             end(limb, ARB_ERR_NOT_READY, 0);
         }
     }
+    profile_run_on_event(&limb->run, arb, now_ms, event);
 }
 
 /* A job of arb_config has ended. */
@@ -460,7 +464,8 @@ static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
     }
 }
 
-/* Is there something to be saved, and nothing in the way? */
+/* Is there something to be saved, and nothing in the way? Before the start-up and on standby there is no
+ * limb. */
 static bool may_auto_save(const arb_limb_t *limb)
 {
     return limb->unsaved && limb->stage == STAGE_IDLE && limb->run.state == PROFILE_RUNNING &&

@@ -101,6 +101,6 @@ static inline uint8_t arb_limb_state(const arb_limb_t *limb)
 bool arb_limb_take_change(arb_limb_t *limb);
 
 /* The host has written the stored configurations (240Dh). */
-void arb_limb_on_written(arb_limb_t *limb);
+void arb_limb_on_written(arb_limb_t *limb, pdcp_arb_t *arb);
 
 #endif

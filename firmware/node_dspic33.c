@@ -1,9 +1,16 @@
 /* A device of a bench on a dsPIC33: NODE_ROLE says which. With an arbitrator on a fourth board the three are
  * a limb, the second test system of [PROFILE 6.2.2]; the joystick has two outputs more than there.
  *
- *   1 joystick     out 1 the stick's X axis, 2120h; out 2 its Y axis, 2100h; out 3 its button, 2000h
- *   2 controller   in 1 2200h, in 2 2110h; out 3 1100h (requires 2), out 4 1210h (1), out 5 1220h (2): copies
- * of them 3 LED bar      terminal in 1 the bar of ten LEDs, 1110h; terminal in 2 the board's LED, 1220h */
+ *   1  joystick    out 1  the stick's X axis, 2120h
+ *                  out 2  its Y axis, 2A64h
+ *                  out 3  its button, 2A20h
+ *   2  controller  in 1   2200h
+ *                  in 2   2110h
+ *                  out 3  1100h, a copy of in 2, which it requires
+ *                  out 4  1210h, of in 1
+ *                  out 5  1220h, of in 2
+ *   3  LED bar     in 1   terminal, 1110h: the bar of ten LEDs
+ *                  in 2   terminal, 1220h: the board's LED */
 #include <stdbool.h>
 #include <stddef.h>
 #include <string.h>
@@ -45,17 +52,16 @@ enum {
         (text), sizeof(text) - 1                                                                             \
     }
 
-static const uint8_t node_requires_1 = 0x40; /* bit strings, first bit = channel 0 (D-BUS-8) */
-static const uint8_t node_requires_2 = 0x20;
-
 #if NODE_ROLE == 1
 #define NODE_TEXT "joystick"
 static const pdcp_device_channel_desc_t node_channels[] = {
     {.direction = PDCP_OUTPUT, .type = OUT_8, .profile = 0x2120, .descriptor = TEXT("stick X")},
-    {.direction = PDCP_OUTPUT, .type = OUT_8, .profile = 0x2100, .descriptor = TEXT("stick Y")},
-    {.direction = PDCP_OUTPUT, .type = OUT_BOOLEAN, .profile = 0x2000, .descriptor = TEXT("button")}};
+    {.direction = PDCP_OUTPUT, .type = OUT_8, .profile = 0x2A64, .descriptor = TEXT("stick Y")},
+    {.direction = PDCP_OUTPUT, .type = OUT_BOOLEAN, .profile = 0x2A20, .descriptor = TEXT("button")}};
 #elif NODE_ROLE == 2
 #define NODE_TEXT "controller"
+static const uint8_t node_requires_1 = 0x40; /* bit strings, first bit = channel 0 (D-BUS-8) */
+static const uint8_t node_requires_2 = 0x20;
 static const pdcp_device_channel_desc_t node_channels[] = {
     {.direction = PDCP_INPUT, .type = IN_BOOLEAN, .profile = 0x2200, .descriptor = TEXT("switch")},
     {.direction = PDCP_INPUT, .type = IN_8, .profile = 0x2110, .descriptor = TEXT("muscle")},
@@ -237,7 +243,7 @@ static void send_outputs(node_t *self, uint32_t now_ms)
         return;
     }
     self->sent_ms = now_ms;
-    for (uint8_t channel = 1; channel <= CHANNELS; channel++) {
+    for (uint8_t channel = 1; channel <= (uint8_t)CHANNELS; channel++) {
         profile_type_t type;
         uint8_t bytes[2];
         if (node_channels[channel - 1].direction == PDCP_OUTPUT) {

@@ -49,11 +49,6 @@ typedef struct {
 } pdcp_link_source_t;
 
 typedef struct {
-    pdcp_bus_t bus;
-    pdcp_bind_t bind;
-    pdcp_link_t link;
-    pdcp_host_request_t host;
-    pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
     uint32_t asked_ms;   /* when a device asked to bind last, or the start */
     uint32_t started_ms; /* means something while young */
     bool young;          /* in its first PDCP_YOUNG_MS */
@@ -63,6 +58,11 @@ typedef struct {
     bool silent;         /* on standby (D-BUS-12) */
     bool restart;        /* the controller is to be restarted */
     pdcp_recovery_t recovery;
+    pdcp_bus_t bus;
+    pdcp_link_t link;
+    pdcp_host_request_t host;
+    pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
+    pdcp_bind_t bind;
 } pdcp_arb_t;
 
 /* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).

@@ -88,12 +88,12 @@ typedef struct {
 } pdcp_channel_t;
 
 typedef struct {
-    pdcp_node_t nodes[PDCP_DEVICES_MAX];
+    uint16_t needs_used;
     pdcp_channel_t channels[PDCP_CHANNELS_MAX];
+    pdcp_node_t nodes[PDCP_DEVICES_MAX];
     uint8_t
         owner[256]; /* node id: 0 free; place + 1: the device's own; 80h + place + 1: of one of its outputs */
     uint8_t needs[PDCP_NEEDS_BYTES];
-    uint16_t needs_used;
 } pdcp_nodes_t;
 
 void pdcp_nodes_init(pdcp_nodes_t *nodes);

@@ -56,7 +56,7 @@ int8_t profile_order(const pdcp_identity_t *a, const pdcp_identity_t *b)
     if (order == 0) {
         order = order_words(a->pid, b->pid);
     }
-    return order != 0 ? order : order_words(a->sn, b->sn);
+    return (int8_t)(order != 0 ? order : order_words(a->sn, b->sn));
 }
 
 bool profile_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b)

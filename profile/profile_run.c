@@ -626,7 +626,7 @@ static bool carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 static bool has_awaited(const profile_run_t *run)
 {
     uint8_t all = 0;
-    for (uint8_t i = 0; i < PROFILE_PLACE_BYTES; i++) {
+    for (uint8_t i = 0; i < (uint8_t)PROFILE_PLACE_BYTES; i++) {
         all |= run->awaited[i];
     }
     return all != 0;

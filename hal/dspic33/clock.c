@@ -56,7 +56,7 @@ bool clock_start(void)
     return true;
 }
 
-/* At most 20 cycles. */
+/* 28 cycles, 0.7 us. */
 void PART_HANDLER _T1Interrupt(void)
 {
     IFS0bits.T1IF = 0;

@@ -17,8 +17,8 @@
 #define BRP_PLUS_1 (CLOCK_PAIRS <= 25u ? 1u : CLOCK_PAIRS % 2u == 0 ? 2u : CLOCK_PAIRS % 3u == 0 ? 3u : 5u)
 #define QUANTA (CLOCK_PAIRS / BRP_PLUS_1)
 #define SEGMENT_2 (QUANTA / 4u)
-#define BEFORE_SAMPLE                                                                                        \
-    (QUANTA - 1u - SEGMENT_2) /* propagation and segment 1; one quantum is the synchronisation */
+/* Propagation and segment 1; one quantum is the synchronisation. */
+#define BEFORE_SAMPLE (QUANTA - 1u - SEGMENT_2)
 #define SEGMENT_1 (BEFORE_SAMPLE / 2u)
 #define PROPAGATION (BEFORE_SAMPLE - SEGMENT_1)
 #define JUMP (SEGMENT_2 < 4u ? SEGMENT_2 : 4u)
@@ -42,7 +42,7 @@ enum {
     FIFO_FIRST = 8,
     PRIORITIES = 4,
     TX_PLACES = 4, /* of one priority */
-    RX_PLACES = 32,
+    RX_PLACES = PART_CAN_RX_PLACES,
     FILTERS_MAX = 8,
     MODE_NORMAL = 0,
     MODE_DISABLED = 1,
@@ -76,6 +76,13 @@ enum { W0_IDE = 0x0001, W0_SRR = 0x0002, W2_RTR = 0x0200, W2_DLC = 0x000F };
 
 static volatile uint16_t ecan1_buffers[BUFFERS][WORDS] PART_DMA_MEMORY(512);
 
+/* What is kept of a received buffer: all but the extended identifier. */
+typedef struct {
+    uint16_t word_0;
+    uint16_t word_2;
+    uint16_t data[4];
+} raw_frame_t;
+
 struct hal_can {
     ring_t rx_ring;
     ring_t tx_rings[PRIORITIES];
@@ -89,7 +96,7 @@ struct hal_can {
     volatile uint32_t tx_failed;
     uint8_t filter_count;
     hal_can_filter_t filters[FILTERS_MAX];
-    can_frame_t rx_frames[RX_PLACES];
+    raw_frame_t rx_frames[RX_PLACES];
     can_frame_t tx_frames[PRIORITIES][TX_PLACES];
 };
 
@@ -113,7 +120,7 @@ static bool enter_configuration(void)
  */
 static void start_dma(void)
 {
-    PART_DMA_CLEAR_ERRORS();
+    PART_DMA_PREPARE();
     DMA0CON = 0x0020; /* words, peripheral to RAM, peripheral indirect, continuous */
     DMA0PAD = (uint16_t)(uintptr_t)&C1RXD;
     DMA0CNT = WORDS - 1;
@@ -277,14 +284,14 @@ bool hal_can_send(hal_can_t *can, const can_frame_t *frame)
 
 /* --- in --- */
 
-static bool is_full(uint8_t buffer)
+PART_INLINE bool is_full(uint8_t buffer)
 {
     const uint16_t flags = buffer < 16 ? C1RXFUL1 : C1RXFUL2;
     return (flags >> (buffer & 15u) & 1u) != 0;
 }
 
 /* The flags are cleared by writing 0; a 1 leaves them alone. */
-static void release(uint8_t buffer)
+PART_INLINE void release(uint8_t buffer)
 {
     const uint16_t others = (uint16_t) ~(1u << (buffer & 15u));
     if (buffer < 16) {
@@ -294,62 +301,47 @@ static void release(uint8_t buffer)
     }
 }
 
-static void read_frame(const volatile uint16_t *words, can_frame_t *frame)
-{
-    const uint8_t dlc = (uint8_t)(words[2] & W2_DLC);
-    frame->dlc = dlc > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : dlc;
-    for (uint8_t i = 0; i < 4; i++) {
-        const uint16_t word = words[3 + i];
-        frame->data[2 * i] = (uint8_t)word;
-        frame->data[2 * i + 1] = (uint8_t)(word >> 8);
-    }
-    frame->id = 0;
-    if ((words[0] & W0_IDE) != 0) {
-        frame->kind = (words[2] & W2_RTR) != 0 ? CAN_FRAME_REMOTE : CAN_FRAME_EXTENDED;
-    } else if ((words[0] & W0_SRR) != 0) {
-        frame->kind = CAN_FRAME_REMOTE;
-    } else {
-        frame->kind = CAN_FRAME_BASE;
-        frame->id = (uint16_t)(words[0] >> 2);
-    }
-}
-
-static void take_buffer(uint8_t buffer)
+PART_INLINE void take_buffer(uint8_t buffer)
 {
     volatile uint16_t *words = ecan1_buffers[buffer];
     ring_t *ring = &ecan1.rx_ring;
-    if (words[0] == UNUSED || ring_count(ring) == RX_PLACES) {
-        ecan1.rx_overruns++;
+    if (words[0] == UNUSED) {
+        ecan1.rx_overruns++; /* DMA put it elsewhere */
     } else {
-        read_frame(words, &ecan1.rx_frames[ring_place(ring->head, RX_PLACES)]);
+        raw_frame_t *place = &ecan1.rx_frames[ring_place(ring->head, RX_PLACES)];
+        place->word_0 = words[0];
+        place->word_2 = words[2];
+        place->data[0] = words[3];
+        place->data[1] = words[4];
+        place->data[2] = words[5];
+        place->data[3] = words[6];
         ring->head++;
     }
     words[0] = UNUSED;
     release(buffer);
 }
 
-/* The next full buffer from this one on; BUFFERS: there is none. After an overflow the controller's pointer
- * may stand at an empty one. */
+/* The next full buffer behind this one; there is one. */
 static uint8_t next_full(uint8_t buffer)
 {
-    if (((C1RXFUL1 >> FIFO_FIRST) | C1RXFUL2) == 0) {
-        return BUFFERS;
-    }
-    for (uint8_t i = 0; i < BUFFERS - FIFO_FIRST; i++) {
-        if (is_full(buffer)) {
-            return buffer;
-        }
+    do {
         buffer = buffer == BUFFERS - 1 ? FIFO_FIRST : (uint8_t)(buffer + 1);
-    }
-    return BUFFERS;
+    } while (!is_full(buffer));
+    return buffer;
 }
 
-static void drain_fifo(void)
+PART_INLINE bool fifo_holds_frames(void)
 {
-    uint8_t buffer = next_full((uint8_t)C1FIFObits.FNRB);
-    while (buffer != BUFFERS) {
-        take_buffer(buffer);
-        buffer = next_full((uint8_t)C1FIFObits.FNRB);
+    return ((C1RXFUL1 >> FIFO_FIRST) | C1RXFUL2) != 0;
+}
+
+/* What finds no place in the ring stays in the FIFO until hal_can_receive has made room. After an overflow the
+ * controller's pointer may stand at an empty buffer. */
+PART_INLINE void drain_fifo(void)
+{
+    while (fifo_holds_frames() && ring_count(&ecan1.rx_ring) != RX_PLACES) {
+        const uint8_t buffer = (uint8_t)C1FIFObits.FNRB;
+        take_buffer(is_full(buffer) ? buffer : next_full(buffer));
     }
 }
 
@@ -384,15 +376,37 @@ static bool passes(const hal_can_t *can, const can_frame_t *frame)
     return false;
 }
 
+static void decode(const raw_frame_t *raw, can_frame_t *frame)
+{
+    const uint8_t dlc = (uint8_t)(raw->word_2 & W2_DLC);
+    frame->dlc = dlc > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : dlc;
+    for (uint8_t i = 0; i < 4; i++) {
+        frame->data[2 * i] = (uint8_t)raw->data[i];
+        frame->data[2 * i + 1] = (uint8_t)(raw->data[i] >> 8);
+    }
+    frame->id = 0;
+    if ((raw->word_0 & W0_IDE) != 0) {
+        frame->kind = (raw->word_2 & W2_RTR) != 0 ? CAN_FRAME_REMOTE : CAN_FRAME_EXTENDED;
+    } else if ((raw->word_0 & W0_SRR) != 0) {
+        frame->kind = CAN_FRAME_REMOTE;
+    } else {
+        frame->kind = CAN_FRAME_BASE;
+        frame->id = (uint16_t)(raw->word_0 >> 2);
+    }
+}
+
 size_t hal_can_receive(hal_can_t *can, can_frame_t *frames, size_t max)
 {
     size_t count = 0;
     while (count < max && ring_count(&can->rx_ring) != 0) {
-        frames[count] = can->rx_frames[ring_place(can->rx_ring.tail, RX_PLACES)];
+        decode(&can->rx_frames[ring_place(can->rx_ring.tail, RX_PLACES)], &frames[count]);
         can->rx_ring.tail++;
         if (passes(can, &frames[count])) {
             count++;
         }
+    }
+    if (fifo_holds_frames()) {
+        IFS2bits.C1IF = 1; /* runs the handler: there is room in the ring now */
     }
     while (count < max && can->errors_told != can->errors_seen) {
         can->errors_told++;
@@ -482,7 +496,9 @@ hal_can_health_t hal_can_health(const hal_can_t *can)
     return health;
 }
 
-/* Flags are cleared before the work they stand for: what comes during the work sets them again. */
+/* Flags are cleared before the work they stand for: what comes during the work sets them again.
+ * 272 cycles with one frame, 6.8 us; 448 at most in the run of a limb, 11.2 us. Some 100 for each further
+ * frame that waits, so 65 us with a full FIFO, when handlers were off for a millisecond. */
 void PART_HANDLER _C1Interrupt(void)
 {
     IFS2bits.C1IF = 0;
@@ -498,7 +514,7 @@ void PART_HANDLER _C1Interrupt(void)
     if ((flags & INTF_ERR) != 0 && (C1INTF & INTF_TXBO) != 0 && !ecan1.held) {
         hold_off();
     }
-    if (!ecan1.held) {
+    if ((flags & INTF_TB) != 0 && !ecan1.held) {
         advance_tx();
     }
 }

@@ -182,6 +182,7 @@ static i2c1_state_t next_step(void)
     }
 }
 
+/* At most 138 cycles, 3.5 us. */
 void PART_HANDLER _MI2C1Interrupt(void)
 {
     IFS1bits.MI2C1IF = 0;

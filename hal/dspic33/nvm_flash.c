@@ -6,9 +6,13 @@
  * power may fail at any instruction.
  *
  * One entry is a slot of 32 instructions: their lower 16 bits are the 64 bytes, the upper 8 bits of
- *   0, 1     the page's number, LSB first (0 to 511; HEADER: the area's header, whose first two bytes are its
- * sequence number) 30, 31   CRC-16 (polynomial 1021h, initial FFFFh) over the 64 bytes and the number others
- * 0 It is programmed from the first to the last, so a cut one has a wrong CRC and is passed over.
+ *
+ *   0, 1     the page's number, LSB first: 0 to 511
+ *            or HEADER: the area's header, whose first two bytes are its sequence number
+ *   30, 31   CRC-16 (polynomial 1021h, initial FFFFh) over the 64 bytes and the number
+ *   others   0
+ *
+ * It is programmed from the first to the last, so a cut one has a wrong CRC and is passed over.
  *
  * An area holds SLOTS - 1 entries: a memory with that many pages in use is full, and a write to one more
  * fails. */

@@ -19,6 +19,10 @@
 /* An interrupt handler. None reads constants, which stand in flash, so none needs the window to flash. */
 #define PART_HANDLER __attribute__((interrupt, no_auto_psv))
 
+/* A function of a handler: the compiler is to put it there, at -O1 too, where it does no inlining of its own.
+ */
+#define PART_INLINE static inline __attribute__((always_inline))
+
 /* RAM that a reset leaves alone. */
 #define PART_KEPT __attribute__((persistent))
 
@@ -28,6 +32,7 @@
 #endif
 
 /* C99 has no static assertion: a negative array size does not compile. */
+/* NOLINTNEXTLINE(bugprone-macro-parentheses): a name is declared */
 #define PART_ASSERT(name, condition) typedef char name[(condition) ? 1 : -1]
 
 /* The priorities of the handlers, 7 the most urgent. How long the hardware waits before something is lost:

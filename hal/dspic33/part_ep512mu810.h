@@ -15,16 +15,27 @@
  */
 #define PART_CAN_CANCKS 0
 
-/* DMA reaches all of RAM. The dual-ported RAM at D000h would save it waiting, but the processor sees it
- * through a page register only: buffers stand below 8000h. */
+/* Frames in the receive ring, a power of two, 128 at most. */
+#define PART_CAN_RX_PLACES 128
+
+/* DMA reaches all of RAM. In the dual-ported RAM at D000h it would never wait for the processor, but that
+ * sees it through a page register only: buffers stand below 8000h, and the bus arbiter (MSTRPR) lets DMA go
+ * before the processor. The other way round, as after reset, a word of a received frame may be lost
+ * (erratum). */
 #define PART_DMA_MEMORY(alignment) __attribute__((space(xmemory), aligned(alignment)))
 #define PART_DMA0_START(buffer) (DMA0STAL = (uint16_t)(uintptr_t)(buffer), DMA0STAH = 0)
 #define PART_DMA1_START(buffer) (DMA1STAL = (uint16_t)(uintptr_t)(buffer), DMA1STAH = 0)
-#define PART_DMA_CLEAR_ERRORS() (DMAPWC = 0, DMARQC = 0)
+#define PART_DMA_PREPARE() (DMAPWC = 0, DMARQC = 0, MSTRPR = 0x0020)
 
 /* SCL period = (BRG + 2) / FCY + 120 ns; where the module counts half periods, as later manuals of the family
  * have it, the bus runs at half the rate, which all devices on it bear. */
 #define PART_I2C_BRG(fcy, scl) ((uint16_t)((fcy) / (scl) - (fcy) / 8333333uL - 2u))
+
+/* The switch for all interrupts, off after a reset. */
+static inline void part_enable_interrupts(void)
+{
+    INTCON2bits.GIE = 1;
+}
 
 /* Two traps more than the smaller part has. */
 #define PART_GENERIC_TRAPS 1

@@ -15,14 +15,20 @@
 /* ECAN is clocked with the instruction rate: CANCKS = 1 here. */
 #define PART_CAN_CANCKS 1
 
+/* Frames in the receive ring, a power of two: the 12 KB application leaves no room for more. */
+#define PART_CAN_RX_PLACES 32
+
 /* DMA: buffers in DMA RAM, addressed by their offset in it. */
 #define PART_DMA_MEMORY(alignment) __attribute__((space(dma), aligned(alignment)))
 #define PART_DMA0_START(buffer) (DMA0STA = __builtin_dmaoffset(buffer))
 #define PART_DMA1_START(buffer) (DMA1STA = __builtin_dmaoffset(buffer))
-#define PART_DMA_CLEAR_ERRORS() (DMACS0 = 0)
+#define PART_DMA_PREPARE() (DMACS0 = 0)
 
 /* SCL period = (BRG + 1) / FCY + 100 ns. */
 #define PART_I2C_BRG(fcy, scl) ((uint16_t)((fcy) / (scl) - (fcy) / 10000000uL - 1u))
+
+/* There is no switch for all interrupts. */
+static inline void part_enable_interrupts(void) {}
 
 #define PART_GENERIC_TRAPS 0
 

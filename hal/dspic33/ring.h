@@ -7,18 +7,20 @@
 
 #include <stdint.h>
 
+#include "part.h"
+
 typedef struct {
     volatile uint8_t head; /* written by the writer alone */
     volatile uint8_t tail; /* written by the reader alone */
 } ring_t;
 
-static inline uint8_t ring_count(const ring_t *ring)
+PART_INLINE uint8_t ring_count(const ring_t *ring)
 {
     return (uint8_t)(ring->head - ring->tail);
 }
 
 /* The place of the entry that head or tail stands for. */
-static inline uint8_t ring_place(uint8_t counter, uint8_t capacity)
+PART_INLINE uint8_t ring_place(uint8_t counter, uint8_t capacity)
 {
     return (uint8_t)(counter & (capacity - 1u));
 }

@@ -21,15 +21,14 @@ enum {
 };
 
 static sys_fault_t sys_last_fault PART_KEPT;
-static uint16_t
-    sys_noise[16] PART_KEPT; /* after power-on, what RAM cells fall to: another pattern in each part */
+/* After power-on what RAM cells fall to: another pattern in each part. */
+static uint16_t sys_noise[16] PART_KEPT;
 
 static sys_reset_t sys_cause;
 static bool sys_faulted;
 static uint32_t sys_kicked_ms;
 
-/* Two instructions at the end of flash, written by the programmer (tools/flash --serial); erased: no number.
- */
+/* Two instructions near the end of flash, written by tools/flash --serial; erased: no number. */
 static const uint16_t sys_serial_words[2]
     __attribute__((space(prog), address(PART_SERIAL_AT), noload, unused));
 
@@ -37,6 +36,7 @@ void sys_start(void)
 {
     const uint16_t flags = RCON;
     RCON = flags & (uint16_t) ~(RCON_CAUSES | RCON_SLEEP_IDLE);
+    part_enable_interrupts();
     if ((flags & RCON_POR) != 0) {
         sys_last_fault.magic = 0;
     }

@@ -39,7 +39,8 @@ typedef struct {
     uint16_t count; /* faults since power-on */
 } sys_fault_t;
 
-/* First of all: finds out why the program starts. */
+/* First of all: finds out why the program starts, and lets interrupts come, of which each driver enables its
+ * own. */
 void sys_start(void);
 
 sys_reset_t sys_reset_cause(void);

@@ -82,7 +82,8 @@ static void take_byte(uint16_t status)
 }
 
 /* The error bits belong to the byte that is read next, so they are read first. Clearing an overrun empties
- * the receiver, so that is done last; until then nothing more is received. */
+ * the receiver, so that is done last; until then nothing more is received.
+ * 88 cycles with one byte, 2.2 us; some 50 for each further one, of which there are four at most. */
 void PART_HANDLER _U1RXInterrupt(void)
 {
     IFS0bits.U1RXIF = 0;
@@ -97,6 +98,7 @@ void PART_HANDLER _U1RXInterrupt(void)
     }
 }
 
+/* 144 cycles with four bytes, 3.6 us. */
 void PART_HANDLER _U1TXInterrupt(void)
 {
     ring_t *ring = &uart1.tx_ring;

@@ -5,7 +5,6 @@
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <poll.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -129,13 +128,9 @@ static bool flush_output(can_socketcand_t *can)
     return true;
 }
 
-static bool put_element(can_socketcand_t *can, const char *format, ...) __attribute__((format(printf, 2, 3)));
-static bool put_element(can_socketcand_t *can, const char *format, ...)
+/* Sends the element that has been written to output, size characters. */
+static bool put_element(can_socketcand_t *can, int size)
 {
-    va_list arguments;
-    va_start(arguments, format);
-    int size = vsnprintf(can->output, sizeof can->output, format, arguments);
-    va_end(arguments);
     can->output_at = 0;
     can->output_size = (size_t)size;
     can->output_is_frame = can->state == STATE_RAW;
@@ -313,11 +308,11 @@ static bool answer_greeting(can_socketcand_t *can, const char *word, size_t leng
 {
     if (word_is(word, length, "hi") && can->state == STATE_GREETING) {
         can->state = STATE_OPENING;
-        return put_element(can, "< open %s >", can->name);
+        return put_element(can, snprintf(can->output, sizeof can->output, "< open %s >", can->name));
     }
     if (word_is(word, length, "ok") && can->state == STATE_OPENING) {
         can->state = STATE_SWITCHING;
-        return put_element(can, "< rawmode >");
+        return put_element(can, snprintf(can->output, sizeof can->output, "< rawmode >"));
     }
     if (word_is(word, length, "ok") && can->state == STATE_SWITCHING) {
         can->state = STATE_RAW;
@@ -473,7 +468,9 @@ static bool can_socketcand_send(hal_can_t *base, const can_frame_t *frame)
     for (unsigned i = 0, at = 0; i < dlc; i++) {
         at += (unsigned)snprintf(data + at, sizeof data - at, " %X", frame->data[i]);
     }
-    if (put_element(can, "< send %03X %u%s >", frame->id & CAN_FRAME_ID_MAX, dlc, data)) {
+    const int size = snprintf(can->output, sizeof can->output, "< send %03X %u%s >",
+                              frame->id & CAN_FRAME_ID_MAX, dlc, data);
+    if (put_element(can, size)) {
         return true;
     }
     can->output_size = 0; /* not taken; epoll reports the lost connection */

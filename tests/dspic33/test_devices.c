@@ -16,6 +16,7 @@ static uint32_t now_ms;
 void setUp(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     TEST_ASSERT_TRUE(clock_start());
     i2c1_open();
     now_ms += 5000; /* the bar is set up anew */

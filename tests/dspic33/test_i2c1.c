@@ -18,6 +18,7 @@ enum { PART_AT_PORT = 0x0E32 };
 void setUp(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     TEST_ASSERT_TRUE(clock_start());
     i2c1_open();
 }
@@ -115,6 +116,7 @@ static void test_bus_that_hangs_is_recovered_after_30_ms(void)
 static void test_device_that_drives_the_bus_at_the_start_is_clocked_free(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     fake.sda_held_clocks = 9;
     fake_poke(PART_AT_PORT, 0);
     i2c1_open();
@@ -126,6 +128,7 @@ static void test_device_that_drives_the_bus_at_the_start_is_clocked_free(void)
 static void test_shorted_bus_does_not_stop_the_program(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     fake.sda_held_clocks = 1000;
     fake_poke(PART_AT_PORT, 0);
     i2c1_open();

@@ -12,6 +12,7 @@
 static hal_nvm_t *start(bool keep)
 {
     fake_power_on(keep);
+    fake_enable_interrupts();
     TEST_ASSERT_TRUE(clock_start());
     i2c1_open();
     return nvm_open();

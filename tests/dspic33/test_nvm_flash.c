@@ -15,6 +15,7 @@
 hal_nvm_t *nvm_contract_open(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     return nvm_open();
 }
 
@@ -23,6 +24,7 @@ hal_nvm_t *nvm_contract_reopen(hal_nvm_t *nvm)
     (void)nvm;
     fake.flash_cut_after = FAKE_NEVER;
     fake_power_on(true);
+    fake_enable_interrupts();
     return nvm_open();
 }
 
@@ -31,6 +33,7 @@ void nvm_contract_wait(void) {}
 void setUp(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
 }
 
 void tearDown(void)
@@ -146,6 +149,7 @@ static uint8_t other_byte(uint16_t page)
 static hal_nvm_t *make_nearly_full(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     hal_nvm_t *nvm = nvm_open();
     for (uint16_t page = 1; page < 20; page++) {
         write_byte(nvm, (uint16_t)(page * 64), other_byte(page));

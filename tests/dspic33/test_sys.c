@@ -67,6 +67,13 @@ static void test_cause_of_the_reset(void)
     }
 }
 
+#if defined(__dsPIC33EP512MU810__)
+static void test_interrupts_are_let_through(void)
+{
+    TEST_ASSERT_EQUAL_HEX16(0x8000, fake_peek(0x08C2) & 0x8000);
+}
+#endif
+
 static void restart_by(void (*trap)(void))
 {
     jmp_buf reset;
@@ -203,6 +210,9 @@ int main(void)
     RUN_TEST(test_tick_counts_milliseconds);
     RUN_TEST(test_crystal_that_does_not_start_is_noticed);
     RUN_TEST(test_cause_of_the_reset);
+#if defined(__dsPIC33EP512MU810__)
+    RUN_TEST(test_interrupts_are_let_through);
+#endif
     RUN_TEST(test_every_trap_is_written_down_and_restarts);
     RUN_TEST(test_watchdog_is_kicked_only_while_the_clock_runs);
     RUN_TEST(test_idle_ends_with_the_tick_and_is_left_out_when_there_is_work);

@@ -11,6 +11,7 @@ static hal_uart_t *uart;
 void setUp(void)
 {
     fake_power_on(false);
+    fake_enable_interrupts();
     uart = uart1_open(UART1_BRG(128000uL));
 }
 

@@ -21,8 +21,9 @@ typedef struct {
     uint64_t now_us;
     unsigned watchdog_kicks;
     unsigned idles;
-    jmp_buf *on_reset;     /* where PART_RESET goes; NULL: nowhere, which fails the test */
-    void (*on_idle)(void); /* called in Idle(), before time passes */
+    jmp_buf *on_reset;       /* where PART_RESET goes; NULL: nowhere, which fails the test */
+    void (*on_idle)(void);   /* called in Idle(), before time passes */
+    void (*on_access)(void); /* called before each register access, but not inside itself */
     /* Oscillator: false: the crystal does not start. */
     bool crystal;
     /* CAN */
@@ -55,6 +56,9 @@ extern fake_t fake;
 
 /* Power on: everything as after a power-on reset; the contents of EEPROM and flash stay if keep_memory. */
 void fake_power_on(bool keep_memory);
+
+/* What sys_start does on the EP part, for tests of drivers alone. */
+void fake_enable_interrupts(void);
 
 /* Lets time pass: hardware works, handlers run. */
 void fake_run_us(uint32_t us);

@@ -47,7 +47,7 @@ static volatile uint16_t *dma_buffer(uint16_t channel_at, uint16_t direction, ui
 
 static bool bit_of(uint16_t at, uint8_t buffer)
 {
-    return (*fake_at((uint16_t)(at + buffer / 16 * 2)) >> buffer % 16 & 1u) != 0;
+    return (*fake_at((uint16_t)(at + buffer / 16 * 2)) & 1u << buffer % 16) != 0;
 }
 
 static void set_bit_of(uint16_t at, uint8_t buffer)

@@ -14,7 +14,8 @@ static uint16_t disi_left;
 static bool unlocked; /* OSCCON is being written by its own sequence */
 static unsigned switch_left;
 static uint32_t tick_left_us;
-static int level; /* of the handler that runs */
+static int level;      /* of the handler that runs */
+static bool accessing; /* fake.on_access runs */
 
 /* Handlers that a test does not link are not there. */
 void _T1Interrupt(void) __attribute__((weak));
@@ -61,7 +62,7 @@ static bool all_off(void)
 
 static bool is_pending(const source_t *source)
 {
-    return ((*fake_at(source->flags) & *fake_at(source->enables)) >> source->bit & 1u) != 0;
+    return (*fake_at(source->flags) & *fake_at(source->enables) & 1u << source->bit) != 0;
 }
 
 static void settle(void);
@@ -105,8 +106,8 @@ static void pins_changed(uint16_t at, uint16_t before, uint16_t after)
 {
     const uint16_t clock_at = PART_AT(0x02C8, 0x0E30);
     const uint16_t clock_bit = PART_AT(8, 10);
-    if (at == clock_at && ((before ^ after) >> clock_bit & 1u) != 0) {
-        fake_i2c_clock_pin((after >> clock_bit & 1u) != 0);
+    if (at == clock_at && ((before ^ after) & 1u << clock_bit) != 0) {
+        fake_i2c_clock_pin((after & 1u << clock_bit) != 0);
     }
     if (is_pin_select(at) && (*fake_at(0x0742) & 0x40) != 0) {
         fake.misuses++;
@@ -160,6 +161,11 @@ static void step_oscillator(void)
 volatile uint16_t *fake_register(uint16_t at)
 {
     settle();
+    if (fake.on_access != NULL && !accessing) {
+        accessing = true;
+        fake.on_access();
+        accessing = false;
+    }
     step_oscillator();
     if (disi_left != 0) {
         disi_left--;
@@ -196,7 +202,7 @@ void fake_disi(uint16_t cycles)
 void fake_write_oscconh(uint8_t value)
 {
     settle();
-    *fake_at(0x0742) = (uint16_t)((*fake_at(0x0742) & 0xF8FFu) | (uint16_t)(value & 7u) << 8);
+    *fake_at(0x0742) = (uint16_t)((*fake_at(0x0742) & 0xF8FFu) | (value & 7u) << 8);
 }
 
 void fake_write_oscconl(uint8_t value)
@@ -289,6 +295,13 @@ void fake_idle(void)
     abort(); /* nothing would ever wake the part */
 }
 
+void fake_enable_interrupts(void)
+{
+#if defined(__dsPIC33EP512MU810__)
+    fake_poke(AT_INTCON2, 0x8000);
+#endif
+}
+
 void fake_power_on(bool keep_memory)
 {
     if (!keep_memory) {
@@ -305,13 +318,11 @@ void fake_power_on(bool keep_memory)
     disi_left = 0;
     switch_left = 0;
     level = 0;
+    accessing = false;
     *fake_at(0x0740) = 0x0003; /* RCON: POR, BOR */
     *fake_at(0x0742) = 0x0000; /* internal oscillator */
     *fake_at(0x0744) = 0x3040;
     *fake_at(0x0746) = 0x0030;
-#if defined(__dsPIC33EP512MU810__)
-    *fake_at(AT_INTCON2) = 0x8000;
-#endif
     fake_can_power_on();
     fake_i2c_power_on();
     fake_uart_power_on();

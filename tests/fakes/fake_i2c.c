@@ -93,7 +93,7 @@ static void take_data(uint8_t byte)
         return;
     }
     if (byte_number <= 2) {
-        pointer = (uint16_t)((pointer << 8 | byte) & 0x7FFFu);
+        pointer = (uint16_t)(((unsigned)pointer << 8 | byte) & 0x7FFFu);
         page_start = pointer & 0x7FC0u;
         return;
     }

@@ -5,7 +5,7 @@
 #include "life.h"
 #include "unity.h"
 
-enum { SOLE_ACCESS = 0x0200, TERMINAL = 0x0100, SPINS_MAX = 3, TEXT = 160 };
+enum { SOLE_ACCESS = 0x0200, SPINS_MAX = 10, TEXT = 160 };
 
 /* --- All the time --- */
 
@@ -205,7 +205,9 @@ static void check_channel(const limb_t *limb, const limb_part_t *part, uint8_t i
     const bool enabled = pdcp_device_channel(sim_node_device(part->node), index)->enabled;
     if (channel == NULL) {
         complain(limb, part, index, "not in the tables");
-    } else if (channel->transfer == PDCP_OUTPUT) {
+        return;
+    }
+    if (channel->transfer == PDCP_OUTPUT) {
         if (enabled && !is_fed(limb, channel)) {
             complain(limb, part, index, "sends, and nobody listens");
         }

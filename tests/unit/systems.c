@@ -330,7 +330,7 @@ void systems_execute(systems_t *s)
 
 static unsigned name_of(const systems_t *s, uint8_t channel)
 {
-    for (uint8_t n = 0; n < SYSTEMS_NAMES; n++) {
+    for (unsigned n = 0; n < SYSTEMS_NAMES; n++) {
         const pdcp_node_t *owner = &s->nodes.nodes[s->nodes.channels[channel].node];
         if (pdcp_identity_equal(&s->named[n], &owner->identity)) {
             return n;
@@ -343,7 +343,7 @@ void systems_planned(const systems_t *s, char text[SYSTEMS_TEXT])
 {
     int used = 0;
     text[0] = '\0';
-    for (uint8_t n = 0; n < SYSTEMS_NAMES; n++) {
+    for (unsigned n = 0; n < SYSTEMS_NAMES; n++) {
         const uint8_t place = pdcp_nodes_find(&s->nodes, &s->named[n]);
         uint8_t i = place != PDCP_NONE ? s->nodes.nodes[place].first_channel : PDCP_NONE;
         for (; i != PDCP_NONE; i = s->nodes.channels[i].next) {

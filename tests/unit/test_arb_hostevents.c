@@ -106,7 +106,7 @@ static void test_links_change(void)
 static void test_the_configuration_changes(void)
 {
     subscribe(0x08);
-    arb_limb_on_written(&app.limb);
+    arb_limb_on_written(&app.limb, &app.arb);
     app.work = true;
     exchange_step(&x);
     expect_event(BYTES(4, TIME, 0, 0));

@@ -265,6 +265,22 @@ static void test_save_and_what_the_info_says(void)
 
 /* --- 2410h --- */
 
+/* The host writes a string without the active configuration: it is not active any more, and decides nothing.
+ */
+static void test_the_active_configuration_is_written_away(void)
+{
+    ask(0x2407, BYTES(1, 0));
+    wait_for_answer();
+    expect(0x2408, BYTES(0, 0));
+    TEST_ASSERT_TRUE(app.arb.link.stored);
+    ask(0x240D, BYTES(0, 0, 6, 0, 1, 0, 0, 15, 0, 0));
+    wait_for_answer();
+    expect(0x240E, NULL, 0);
+    TEST_ASSERT_EQUAL(0, app.limb.active);
+    TEST_ASSERT_FALSE(app.limb.run.stored);
+    TEST_ASSERT_FALSE(app.arb.link.stored);
+}
+
 static void make_link(void)
 {
     static const exchange_pair_t making[] = {
@@ -490,6 +506,7 @@ int main(void)
     RUN_TEST(test_writing_configurations_that_cannot_be);
     RUN_TEST(test_configurations_there_and_back);
     RUN_TEST(test_save_and_what_the_info_says);
+    RUN_TEST(test_the_active_configuration_is_written_away);
     RUN_TEST(test_a_link_is_removed);
     RUN_TEST(test_auto_save_waits_for_the_planner);
     RUN_TEST(test_links_that_cannot_be_removed);

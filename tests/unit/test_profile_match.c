@@ -130,7 +130,7 @@ static void test_only_channels_of_devices_that_are_set_up_are_ready(void)
     TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, PDCP_NONE, PDCP_INPUT));
     TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, PDCP_CHANNELS_MAX - 1, PDCP_INPUT));
     static const uint8_t states[] = {PDCP_NODE_SETUP, PDCP_NODE_FAILED, PDCP_NODE_LOST};
-    for (uint8_t i = 0; i < sizeof states; i++) {
+    for (unsigned i = 0; i < sizeof states; i++) {
         s.nodes.nodes[0].state = states[i];
         TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, in, PDCP_INPUT));
     }

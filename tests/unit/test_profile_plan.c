@@ -366,7 +366,7 @@ static void expect_chain(uint8_t length, bool linked)
 {
     systems_init(&s);
     systems_add(&s, "D15 out 1 5000 2110");
-    for (uint8_t n = 0; n < (length + 7) / 8; n++) {
+    for (int n = 0; n < (length + 7) / 8; n++) {
         const bool last = 8 * (n + 1) >= length;
         add_link_of_chain((uint8_t)(n + 1), (uint8_t)(last ? length - 8 * n : 8), last);
     }
@@ -877,7 +877,7 @@ static void add_symmetric(uint8_t number, uint8_t half)
 static void plan_symmetric(uint8_t channels, uint8_t half)
 {
     systems_init(&s);
-    for (uint8_t n = 0; n < channels / 2 / half; n++) {
+    for (int n = 0; n < channels / 2 / half; n++) {
         add_symmetric((uint8_t)(n + 1), half);
     }
     systems_plan(&s, ALL);
@@ -889,7 +889,7 @@ static void test_steps_grow_with_the_channels(void)
 {
     static const uint8_t sizes[] = {8, 32, 64, 128};
     for (uint8_t half = 2; half <= 8; half = (uint8_t)(half * 2)) {
-        for (uint8_t i = 0; i < sizeof sizes; i++) {
+        for (unsigned i = 0; i < sizeof sizes; i++) {
             plan_symmetric(sizes[i], half);
             TEST_ASSERT_LESS_OR_EQUAL_UINT32(PROFILE_PLAN_STEPS, s.plan.steps);
         }

@@ -11,7 +11,7 @@
 #ifdef __AVR__
 enum { LIMBS = 10, SMALL_LIMBS = 10, DEVICES = 5 }; /* a sample: the PC sees all */
 #else
-enum { LIMBS = 25000, SMALL_LIMBS = 25000, DEVICES = 12 };
+enum { LIMBS = 25000, SMALL_LIMBS = 5000, DEVICES = 12 };
 #endif
 enum { CHANNELS = 6, LINKS = 7, EVENTS = 3, POOL = DEVICES * CHANNELS };
 
@@ -36,6 +36,7 @@ typedef struct {
 static limb_t limb;
 static systems_t s;
 static uint32_t state;
+static uint32_t needy; /* percentage of the channels that require others */
 
 /* Of the plan under check. */
 static uint8_t before[PDCP_CHANNELS_MAX];   /* the links that worked */
@@ -47,7 +48,10 @@ static uint8_t outputs[POOL + 1];        /* the same */
 static uint8_t in_of[PROFILE_LINKS_MAX]; /* ends of the entries, PDCP_NONE: missing */
 static uint8_t out_of[PROFILE_LINKS_MAX];
 
-void setUp(void) {}
+void setUp(void)
+{
+    needy = 30;
+}
 
 void tearDown(void) {}
 
@@ -118,7 +122,7 @@ static void make_device(systems_device_t *device, uint8_t number, uint8_t channe
         make_channel(&device->channels[i]);
     }
     for (uint8_t i = 0; i < device->count; i++) {
-        device->channels[i].required = chance(30) ? random_set(device, 35) : 0;
+        device->channels[i].required = chance(needy) ? random_set(device, 35) : 0;
         device->channels[i].desired = chance(20) ? random_set(device, 35) : 0;
     }
 }
@@ -712,7 +716,7 @@ static void play(bool mixed, uint32_t prints[EVENTS + 1])
 {
     start(mixed);
     prints[0] = plan_and_check(PROFILE_PLAN_ALL);
-    for (uint8_t i = 1; i <= EVENTS; i++) {
+    for (unsigned i = 1; i <= EVENTS; i++) {
         happen();
         if (chance(20)) {
             happen();
@@ -806,6 +810,12 @@ static void check_enforce(void)
     systems_execute(&s);
 }
 
+static bool are_equal(const profile_end_t *a, const profile_end_t *b)
+{
+    return pdcp_identity_equal(&a->owner, &b->owner) && a->index == b->index && a->type == b->type &&
+           a->profile == b->profile && a->owner_type == b->owner_type && a->owner_profile == b->owner_profile;
+}
+
 static void check_saved(void)
 {
     profile_links_t loaded;
@@ -813,8 +823,6 @@ static void check_saved(void)
     profile_link_t other;
     const uint8_t count = s.links.count;
     profile_links_init(&loaded);
-    memset(&one, 0, sizeof one);
-    memset(&other, 0, sizeof other);
     for (uint8_t e = count; e > 0; e--) {
         profile_links_get(&s.links, (uint8_t)((e + limb.seed) % count), &one);
         check(profile_links_put(&loaded, &one, false), "no room");
@@ -823,7 +831,8 @@ static void check_saved(void)
     for (uint8_t e = 0; e < count; e++) {
         profile_links_get(&s.links, e, &one);
         profile_links_get(&loaded, e, &other);
-        check(memcmp(&one, &other, sizeof one) == 0, "a link has changed");
+        check(are_equal(&one.output, &other.output) && are_equal(&one.input, &other.input),
+              "a link has changed");
     }
 }
 
@@ -838,8 +847,8 @@ static void check_clear(void)
 
 static void test_enforce_save_and_load_clear(void)
 {
-    for (uint32_t n = 0; n < LIMBS; n++) {
-        make_limb(first_of(LIMBS) + n, DEVICES, CHANNELS, LINKS);
+    for (uint32_t n = 0; n < SMALL_LIMBS; n++) {
+        make_limb(first_of(SMALL_LIMBS) + n, DEVICES, CHANNELS, LINKS);
         start(chance(50));
         systems_plan(&s, PROFILE_PLAN_ALL);
         link_anything();
@@ -895,8 +904,9 @@ static void test_how_often_a_terminal_channel_is_missed(void)
     uint32_t missed = 0;
     uint32_t unserved = 0;
     uint8_t links[PDCP_CHANNELS_MAX];
+    needy = 80;
     for (uint32_t n = 0; n < SMALL_LIMBS; n++) {
-        make_limb(first_of(SMALL_LIMBS) + n, 3, 5, 0);
+        make_limb(first_of(SMALL_LIMBS) + n, 3, 6, 0);
         limb.absent = 0;
         start(false);
         look_back();
@@ -911,7 +921,7 @@ static void test_how_often_a_terminal_channel_is_missed(void)
     }
     printf("of %lu unserved terminal channels of %lu limbs, %lu could have been served\n",
            (unsigned long)unserved, (unsigned long)SMALL_LIMBS, (unsigned long)missed);
-    TEST_ASSERT_LESS_OR_EQUAL(SMALL_LIMBS / 200, missed);
+    TEST_ASSERT_LESS_OR_EQUAL(SMALL_LIMBS / 1000, missed);
 }
 
 int main(void)

@@ -106,8 +106,9 @@ static uint8_t parameter(arb_call_t *call, bool set)
 {
     const arb_turn_t *turn = call->turn;
     if (turn->started) {
+        const uint8_t error = arb_call_outcome(call);
         call->answer_len = set ? 0 : turn->value_len;
-        return turn->ended ? arb_call_error(turn->status) : ARB_PENDING;
+        return error;
     }
     const uint8_t place = arb_call_device(call, call->payload);
     const uint8_t channel = call->payload[6];
@@ -126,7 +127,7 @@ static uint8_t parameter(arb_call_t *call, bool set)
     const pdcp_status_t status =
         set ? pdcp_arb_set(call->arb, place, channel, param, &call->payload[8], (uint16_t)(call->len - 8))
             : pdcp_arb_get(call->arb, place, channel, param, call->answer, PDCP_PARAMETER_MAX);
-    return status == PDCP_OK ? arb_call_started(call) : ARB_ERR_BUSY;
+    return status == PDCP_OK ? arb_call_started_limited(call) : ARB_ERR_BUSY;
 }
 
 static uint8_t get_parameter(arb_call_t *call)
@@ -191,7 +192,7 @@ static uint8_t configure_link(arb_call_t *call)
     if (turn->started) {
         call->answer[0] = PDCP_LINK_ACTIVE;
         call->answer_len = 1;
-        return turn->ended ? arb_call_error(turn->status) : ARB_PENDING;
+        return arb_call_outcome(call);
     }
     if (arb_call_device(call, &call->payload[0]) == PDCP_NONE ||
         arb_call_device(call, &call->payload[7]) == PDCP_NONE) {
@@ -210,7 +211,7 @@ static uint8_t configure_link(arb_call_t *call)
     }
     switch (pdcp_arb_connect(call->arb, output, input)) {
     case PDCP_OK:
-        return arb_call_started(call);
+        return arb_call_started_limited(call);
     case PDCP_ERR_OWN:
         return ARB_ERR_VALUE;
     default:
@@ -261,14 +262,15 @@ static uint8_t passthrough(arb_call_t *call)
 {
     static const pdcp_identity_t all = {0, 0, 0};
     const arb_turn_t *turn = call->turn;
-    if (turn->started && !turn->ended) {
-        return ARB_PENDING;
-    }
     if (turn->started) {
+        const uint8_t error = arb_call_outcome(call);
+        if (error == ARB_PENDING) {
+            return error; /* what is to be sent stands in the answer */
+        }
         call->answer[6] = (uint8_t)turn->value_len;
         memset(&call->answer[7 + call->answer[6]], 0, 8u - call->answer[6]);
         call->answer_len = PASSTHROUGH;
-        return arb_call_error(turn->status);
+        return error;
     }
     const pdcp_identity_t identity = arb_host_get_identity(call->payload);
     const uint8_t dlc = call->payload[6];
@@ -288,8 +290,8 @@ static uint8_t passthrough(arb_call_t *call)
         (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, place, data[2], data[1]))) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    return pdcp_arb_passthrough(call->arb, place, &call->answer[7], dlc) == PDCP_OK ? arb_call_started(call)
-                                                                                    : ARB_ERR_BUSY;
+    const pdcp_status_t status = pdcp_arb_passthrough(call->arb, place, &call->answer[7], dlc);
+    return status == PDCP_OK ? arb_call_started_limited(call) : (uint8_t)ARB_ERR_BUSY;
 }
 
 static void set_bit(uint8_t *bits, uint8_t number)

@@ -42,6 +42,15 @@ uint8_t arb_call_started_limited(arb_call_t *call)
     return ARB_PENDING;
 }
 
+uint8_t arb_call_outcome(arb_call_t *call)
+{
+    const arb_turn_t *turn = call->turn;
+    if (!turn->ended && !arb_call_wait(call, 0)) {
+        pdcp_arb_give_up(call->arb, call->now_ms); /* its event ends the turn */
+    }
+    return turn->ended ? arb_call_error(turn->status) : (uint8_t)ARB_PENDING;
+}
+
 bool arb_call_is_busy(const arb_call_t *call)
 {
     return pdcp_arb_setup_running(call->arb) || arb_limb_is_busy(call->env->limb);

@@ -54,6 +54,10 @@ uint8_t arb_call_wait_ready(arb_call_t *call);
  * arb_call_wait_ready's. */
 uint8_t arb_call_started_limited(arb_call_t *call);
 
+/* What the bus says about a request that was begun with arb_call_started_limited, ARB_PENDING until then. At
+ * the end of that time it is given up (D-API-16). */
+uint8_t arb_call_outcome(arb_call_t *call);
+
 /* Place of the device that six bytes of a request name; PDCP_NONE: it is not on the bus. */
 uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes);
 

@@ -725,6 +725,23 @@ pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data,
     return host_request(arb, &request);
 }
 
+void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    uint8_t freed = PDCP_NONE;
+    if (arb->host.active) {
+        if (!arb->host.waiting) {
+            freed = arb->host.node;
+            pdcp_request_cancel(&arb->bus, freed);
+        }
+        host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
+    } else {
+        freed = pdcp_link_give_up_wish(&arb->link, &arb->bus, now_ms);
+    }
+    if (freed != PDCP_NONE) {
+        serve(arb, now_ms, freed);
+    }
+}
+
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 {
     const pdcp_msg_t msg = {.code = code, .word = time_ms};

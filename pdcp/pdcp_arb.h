@@ -109,6 +109,11 @@ pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint
  * pdcp_arb_set. */
 pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data, uint8_t dlc);
 
+/* The host waits no longer (D-API-16): what it has asked of a device, or the link that it has asked for, ends
+ * with PDCP_ERR_NO_ANSWER, its event comes at once. What a device has been told already it may have done; a
+ * link half made is undone. */
+void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms);
+
 /* Suspend or Release for all, sent to N=0; devices do not answer. False: no room in the transmit queue. */
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms);
 

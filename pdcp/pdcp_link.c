@@ -585,6 +585,26 @@ static void on_failure(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp
     go_on(link, bus, now_ms);
 }
 
+uint8_t pdcp_link_give_up_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+{
+    const uint8_t at = link->at;
+    pdcp_link_forget_wish(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+    if (!link->active || !link->for_host) {
+        return PDCP_NONE;
+    }
+    link->for_host = false;
+    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->input, PDCP_ERR_NO_ANSWER);
+    if (link->undoing) {
+        return PDCP_NONE;
+    }
+    if (at != PDCP_NONE) {
+        pdcp_request_cancel(bus, at);
+        link->at = PDCP_NONE;
+    }
+    on_failure(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+    return at;
+}
+
 void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, const pdcp_reply_t *reply)
 {
     const bool gone = (is_input_step(link->step) ? link->input : link->output) == PDCP_NONE;

@@ -9,7 +9,6 @@
 
 enum {
     ANSWER_MS = 3000, /* D-API-3 */
-    MANY_MS = 15000,  /* on a line that loses every third frame */
     TABLES_MS = 60,   /* what is answered from the tables */
     SLACK_MS = 30,    /* a step of the world, and what the line holds */
     LINE_BYTES = 12,  /* a millisecond, 128000 baud */
@@ -687,12 +686,6 @@ static bool needs_nobody(uint16_t id)
            id == ARB_MSG_STATISTICS || id == ARB_MSG_EVENT_STREAM || id == 0x2419 || id == 0x2500;
 }
 
-/* Is it a chain of requests to a device, each with its own three tries: a bulk transfer, a link? */
-static bool needs_many(uint16_t id)
-{
-    return id == ARB_MSG_GET_PARAMETER || id == ARB_MSG_SET_PARAMETER || id == ARB_MSG_CONFIGURE_LINK;
-}
-
 /* The request at the front has its answer in time, counted from when it is the first one, and not while the
  * host does not read, or others may come first. */
 static void check_time(life_host_t *host, uint32_t now_ms)
@@ -707,8 +700,7 @@ static void check_time(life_host_t *host, uint32_t now_ms)
         host->front_ms = now_ms;
         return;
     }
-    const uint32_t limit_ms =
-        needs_nobody(front->id) ? TABLES_MS : (needs_many(front->id) ? MANY_MS : ANSWER_MS + SLACK_MS);
+    const uint32_t limit_ms = needs_nobody(front->id) ? TABLES_MS : ANSWER_MS + SLACK_MS;
     if (now_ms - host->front_ms > limit_ms) {
         fail(front, 0, "no answer in time");
     }

@@ -650,6 +650,104 @@ static void test_a_device_vanishes_while_it_is_written(void)
     hostlink_answer(0x2202, 9, BYTES(1, 0, 1, 0));
 }
 
+/* One millisecond after the other until the host has an answer, limit_ms at most; whether it has. */
+static bool answered_within(int limit_ms, int *ms, uint16_t id, uint8_t error)
+{
+    const uint8_t *payload;
+    uint16_t len;
+    for (int i = 0; i < limit_ms; i++) {
+        exchange_wait(&x, 1);
+        ++*ms;
+        const uint16_t have = hostlink_take(&payload, &len);
+        if (have != 0) {
+            TEST_ASSERT_EQUAL_HEX16(id, have);
+            TEST_ASSERT_EQUAL_HEX8(error, payload[0]);
+            return true;
+        }
+    }
+    return false;
+}
+
+static void expect_next_request_works(void)
+{
+    (void)exchange_drain(&x);
+    hostlink_silence();
+    ask(0x2301, BYTES(DEV_OUT, 0, 7));
+    exchange_tx(&x, "311#03 07 00");
+    exchange_rx(&x, "211#83 01 07 00 2A");
+    expect(0x2302, BYTES(0x2A));
+    exchange_silence(&x);
+}
+
+/* D-API-16: a transfer whose every packet comes in time, 90 ms after the one before, would take 7.7 s. */
+static void test_a_slow_device_is_read(void)
+{
+    char text[40];
+    int ms = 0;
+    exchange_add_output(&x, "FE");
+    ask(0x2301, BYTES(DEV_OUT, 0, 7));
+    exchange_rx(&x, "211#83 02 07 00");
+    exchange_rx(&x, "211#8C 01 07 00 0002");
+    uint16_t at = 0;
+    do {
+        (void)exchange_drain(&x);
+        packet(text, "211#", at);
+        exchange_rx(&x, text);
+        exchange_tx(&x, "311#8E 01");
+        at = (uint16_t)(at + 6);
+    } while (!answered_within(90, &ms, 0x2303, 0x05));
+    TEST_ASSERT_EQUAL(3000, ms);
+    packet(text, "211#", at);
+    exchange_rx(&x, text); /* nobody listens any more */
+    expect_next_request_works();
+}
+
+static void test_a_slow_device_is_written(void)
+{
+    int ms = 0;
+    start_writing();
+    while (!answered_within(90, &ms, 0x2306, 0x05)) {
+        exchange_rx(&x, "211#8E 01");
+    }
+    TEST_ASSERT_EQUAL(3000, ms);
+    exchange_rx(&x, "211#8E 01");
+    expect_next_request_works();
+}
+
+/* The same with a link: every write is answered at the last moment. It is undone, and can be made after. */
+static void test_a_slow_device_is_linked(void)
+{
+    static const exchange_pair_t making[] = {
+        {"312#04 05 01 0200 0200", "212#84 01 05 01"}, {"312#04 06 01 0400 01", "212#84 01 06 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01"}, {"312#04 07 01 11 FE", "212#84 01 07 01"},
+        {"312#04 04 01 01", "212#84 01 04 01"},        {"311#04 04 01 01", "211#84 01 04 01"},
+        {NULL, NULL},
+    };
+    int ms = 0;
+    int k = 0;
+    add_devices();
+    exchange_pass(&x, 600); /* the start-up */
+    exchange_beacons(&x);
+    x.arb->bus.nodes.nodes[1].ack_ms = 500;
+    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    while (!answered_within(1400, &ms, 0x2309, 0x05)) {
+        exchange_beacons(&x);
+        exchange_rx(&x, making[k++].rx);
+    }
+    TEST_ASSERT_EQUAL(3000, ms);
+    TEST_ASSERT_EQUAL(2, k);
+    for (ms = 0; ms < 3000; ms += 500) {
+        exchange_beacons(&x);
+        exchange_wait(&x, 500);
+    }
+    (void)exchange_drain(&x);
+    TEST_ASSERT_EQUAL(0, hostlink_waiting());
+    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    exchange_run(&x, making);
+    expect(0x2308, BYTES(2));
+    TEST_ASSERT_EQUAL(0, hostlink_waiting());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -681,5 +779,8 @@ int main(void)
     RUN_TEST(test_a_value_of_512_bytes_is_written);
     RUN_TEST(test_a_device_vanishes_while_it_is_read);
     RUN_TEST(test_a_device_vanishes_while_it_is_written);
+    RUN_TEST(test_a_slow_device_is_read);
+    RUN_TEST(test_a_slow_device_is_written);
+    RUN_TEST(test_a_slow_device_is_linked);
     return UNITY_END();
 }

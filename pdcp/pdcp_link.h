@@ -54,8 +54,8 @@ bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input);
 /* A wish that has not been started ends with status. Nothing happens when there is none. */
 void pdcp_link_forget_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status);
 
-/* The host waits no longer: its wish ends with PDCP_ERR_NO_ANSWER, and a link half made is undone. Returns the
- * place of the device whose request was broken off, PDCP_NONE: of none. */
+/* The host waits no longer: its wish ends with PDCP_ERR_NO_ANSWER, and a link half made is undone. Returns
+ * the place of the device whose request was broken off, PDCP_NONE: of none. */
 uint8_t pdcp_link_give_up_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms);
 
 /* Is a wish of the host under way? */

@@ -73,7 +73,7 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
     (void)now_ms;
     if (event->node != PDCP_NONE) {
         const pdcp_node_t *node = &nodes->nodes[event->node];
-        (void)snprintf(name, sizeof name, "%04X:%04X:%04X (id %u)", node->identity.vid, node->identity.pid,
+        (void)snprintf(name, sizeof name, "%u:%u:%u (id %u)", node->identity.vid, node->identity.pid,
                        node->identity.sn, node->node_id);
     }
     switch (event->kind) {

@@ -248,7 +248,7 @@ void sim_node_print(FILE *out, const sim_node_event_t *event)
     for (uint8_t i = 0; i < event->len; i++) {
         (void)snprintf(&raw[2u * i], 3, "%02x", event->raw[i]);
     }
-    (void)fprintf(out, "{\"t_ms\":%" PRIu64 ",\"device\":\"%04X:%04X:%04X\",\"channel\":%u,",
+    (void)fprintf(out, "{\"t_ms\":%" PRIu64 ",\"device\":\"%u:%u:%u\",\"channel\":%u,",
                   event->time_us / 1000u, event->identity.vid, event->identity.pid, event->identity.sn,
                   event->channel);
     if (event->safe) {

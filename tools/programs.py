@@ -35,7 +35,7 @@ class EndedError(Exception):
 
 def parse_value(line: str) -> Value:
     fields = json.loads(line)
-    device = Identity(*(int(word, 16) for word in fields["device"].split(":")))
+    device = Identity(*(int(word) for word in fields["device"].split(":")))
     return Value(fields["t_ms"], device, fields["channel"], fields["value"], fields.get("safe", False))
 
 

@@ -153,7 +153,7 @@ def test_sigterm(limb: Start, tmp_path: Path) -> None:
 def test_sigterm_of_a_device(start: Start, start_node: Start, files: dict[str, Path]) -> None:
     pdcpd = start("--can", "sim:0")
     node = start_node(pdcpd, files["d1"])
-    until(lambda: any("0002:0002:0004" in line for line in pdcpd.errors), "the device is there")
+    until(lambda: any("2:2:4 (id" in line for line in pdcpd.errors), "the device is there")
     assert node.stop() == 0
     assert node.errors == []
 
@@ -188,7 +188,7 @@ def test_tcp_port_is_free_at_once_after_the_end(start: Start, start_node: Start,
     pdcpd = start("--can", "sim:0")
     port = pdcpd.bus_port()
     start_node(pdcpd, files["d1"])
-    until(lambda: any("0002:0002:0004" in line for line in pdcpd.errors), "the device is there")
+    until(lambda: any("2:2:4 (id" in line for line in pdcpd.errors), "the device is there")
     assert pdcpd.stop() == 0
     assert start("--can", f"sim:{port}").bus_port() == port
 

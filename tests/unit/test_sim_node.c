@@ -349,9 +349,9 @@ static void test_lines(void)
     TEST_ASSERT_EQUAL_INT(0, fclose(out));
     read_file("out.txt", text, sizeof text);
     TEST_ASSERT_EQUAL_STRING(
-        "{\"t_ms\":1234,\"device\":\"0002:0002:00AB\",\"channel\":1,\"raw\":\"f401\",\"value\":-12}\n"
-        "{\"t_ms\":1234,\"device\":\"0002:0002:00AB\",\"channel\":1,\"raw\":\"f401\",\"value\":null}\n"
-        "{\"t_ms\":5,\"device\":\"0001:0002:0003\",\"channel\":2,\"safe\":true,\"value\":9}\n",
+        "{\"t_ms\":1234,\"device\":\"2:2:171\",\"channel\":1,\"raw\":\"f401\",\"value\":-12}\n"
+        "{\"t_ms\":1234,\"device\":\"2:2:171\",\"channel\":1,\"raw\":\"f401\",\"value\":null}\n"
+        "{\"t_ms\":5,\"device\":\"1:2:3\",\"channel\":2,\"safe\":true,\"value\":9}\n",
         text);
 }
 

@@ -89,7 +89,7 @@ def silent_device(bench: Bench, pdcpd: Pdcpd) -> Iterator[int]:
     node = bench.node(bench.description("d1"))
     with bench.host() as host:
         until(lambda: host.system_info()[:3] == (1, 0, 1), "D1 is set up", DEADLINE_S)
-        name = f"{D1.vid:04X}:{D1.pid:04X}:{D1.sn:04X}"
+        name = str(D1)
         line = next(line for line in pdcpd.errors if name in line)
         node.process.send_signal(signal.SIGSTOP)
         yield int(line.split("(id ")[1].split(")")[0])

@@ -104,7 +104,6 @@ static void start(firmware_t *self)
     i2c1_open();
     self->nvm = nvm_open();
     self->uart = uart1_open(UART1_BRG(FIRMWARE_BAUD));
-    self->can = ecan1_open();
     self->port = (arb_port_t){.ctx = self,
                               .can_send = can_send,
                               .can_restart = can_restart,
@@ -114,6 +113,9 @@ static void start(firmware_t *self)
                               .nvm_status = nvm_status};
     const arb_settings_t settings = {.serial = hal_sys_serial()};
     arb_app_init(&self->app, &self->port, &settings, hal_clock_ms());
+    /* Last: that reads the EEPROM, and frames that came meanwhile would be old or lost. Now they are
+     * repeated. */
+    self->can = ecan1_open();
 }
 
 /* Lit; blinks when a fault or the watchdog has restarted the program. */

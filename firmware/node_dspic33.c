@@ -293,7 +293,6 @@ static void start(node_t *self)
     }
     i2c1_open();
     self->nvm = nvm_open();
-    self->can = ecan1_open();
     adc1_open();
     self->port = (pdcp_device_port_t){.ctx = self, .input = on_input, .safe = on_safe, .store = on_store};
     const bool stored = load_record(self);
@@ -302,6 +301,7 @@ static void start(node_t *self)
         sys_fail(SYS_FAULT_HANDLER); /* the tables above are wrong: cannot be */
     }
     show(self);
+    self->can = ecan1_open(); /* last: frames that came while the EEPROM was read would be old */
 }
 
 int main(void)

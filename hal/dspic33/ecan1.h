@@ -1,11 +1,11 @@
 /* ECAN1 with DMA as the CAN controller of hal_can.h, 1 Mbit/s.
  *
  * In: the controller puts frames by DMA into a FIFO of 24 buffers, the handler moves them to a ring of
- * PART_CAN_RX_PLACES frames, and hal_can_receive takes them from there. When the ring is full they stay in the
- * FIFO; a frame that finds that full too is lost and counted in rx_overruns. So the main loop may stay away
- * for 56 frames on the FJ part and 152 on the EP part: 2.6 and 7.1 ms of the shortest ones back to back, 6.2
- * and 16 ms of those with 8 bytes. Frames of other kinds than base data frames come too, with id 0; an error
- * on the wire comes as a CAN_FRAME_ERROR.
+ * PART_CAN_RX_PLACES frames, and hal_can_receive takes them from there. When the ring is full they stay in
+ * the FIFO; a frame that finds that full too is lost and counted in rx_overruns. So the main loop may stay
+ * away for 56 frames on the FJ part and 152 on the EP part: 2.6 and 7.1 ms of the shortest ones back to
+ * back, 6.2 and 16 ms of those with 8 bytes. Frames of other kinds than base data frames come too, with id 0;
+ * an error on the wire comes as a CAN_FRAME_ERROR.
  *
  * Out: one queue and one transmit buffer for each PDCP priority (bits 10 and 9 of the identifier). An urgent
  * frame overtakes all others but the one on the wire; frames of one priority leave in the order in which they

@@ -1,8 +1,9 @@
 /* The interrupt handlers. Their names are the vendor's: its linker scripts put functions so called into the
  * vector table.
  *
- * How long each takes, entry and exit included, stands with it: cycles of the EP part, compiled with -O1, and
- * their time at 40 MIPS. The smaller part needs fewer: its registers are read in one cycle, not two. */
+ * How long each takes at most, entry and exit included, stands with it: cycles that a simulator of the EP
+ * part counted, compiled with -O1, and their time at 40 MIPS. The smaller part needs fewer: its registers are
+ * read in one cycle, not two. Those of traps end in a reset. */
 #ifndef HANDLERS_H
 #define HANDLERS_H
 

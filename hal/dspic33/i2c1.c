@@ -15,8 +15,17 @@ enum {
     CYCLES_OF_ROUND = 4 /* at least, of the wait below */
 };
 
-/* After a collision the module is idle: it has let the bus go by itself. */
-typedef enum { IDLE, STARTED, SENT, RESTARTED, SENT_AGAIN, RECEIVED, ACKNOWLEDGED, STOPPED } i2c1_state_t;
+typedef enum {
+    IDLE,
+    STARTED,
+    SENT,
+    RESTARTED,
+    SENT_AGAIN,
+    RECEIVED,
+    ACKNOWLEDGED,
+    STOPPED,
+    COLLIDED /* the module has let the bus go; a device may still drive it */
+} i2c1_state_t;
 
 typedef struct {
     volatile uint8_t state; /* i2c1_state_t: what was asked of the module last */
@@ -101,7 +110,7 @@ bool i2c1_start(uint8_t device, const uint8_t *out, uint8_t out_size, uint8_t *i
 
 i2c1_status_t i2c1_status(void)
 {
-    if (i2c1.result == I2C1_BUSY && hal_clock_ms() - i2c1.started_ms > HANGS_MS) {
+    if (i2c1.state == COLLIDED || (i2c1.result == I2C1_BUSY && hal_clock_ms() - i2c1.started_ms > HANGS_MS)) {
         recover();
         i2c1.state = IDLE;
         i2c1.result = I2C1_FAILED;
@@ -188,8 +197,7 @@ void PART_HANDLER _MI2C1Interrupt(void)
     IFS1bits.MI2C1IF = 0;
     if ((I2C1STAT & STAT_BCL) != 0) {
         I2C1STAT = 0;
-        i2c1.result = I2C1_FAILED;
-        i2c1.state = IDLE;
+        i2c1.state = COLLIDED;
     } else {
         i2c1.state = (uint8_t)next_step();
     }

@@ -16,8 +16,8 @@ enum {
 typedef enum { IDLE, SENDING, WRITING, FAILED } nvm_state_t;
 
 struct hal_nvm {
-    uint8_t state; /* nvm_state_t */
-    uint32_t sent_ms;
+    uint8_t state;    /* nvm_state_t */
+    uint32_t sent_ms; /* when the last page was sent, or the memory was opened */
     uint8_t bytes[ADDRESS_BYTES + HAL_NVM_PAGE];
 };
 
@@ -26,6 +26,7 @@ static struct hal_nvm nvm;
 hal_nvm_t *nvm_open(void)
 {
     nvm.state = IDLE;
+    nvm.sent_ms = hal_clock_ms();
     return &nvm;
 }
 
@@ -46,6 +47,13 @@ static void set_address(uint8_t *bytes, uint16_t address)
     bytes[1] = (uint8_t)address;
 }
 
+/* After a reset of the processor alone the EEPROM may still be writing, and does not answer before it is
+ * done. */
+static bool may_be_writing(const hal_nvm_t *self, i2c1_status_t status)
+{
+    return status == I2C1_NO_ANSWER && hal_clock_ms() - self->sent_ms <= WRITES_MS;
+}
+
 bool hal_nvm_read(hal_nvm_t *self, uint16_t address, uint8_t *bytes, uint16_t size)
 {
     if ((uint32_t)address + size > HAL_NVM_SIZE) {
@@ -57,7 +65,14 @@ bool hal_nvm_read(hal_nvm_t *self, uint16_t address, uint8_t *bytes, uint16_t si
     while (size != 0) {
         const uint8_t part = size < READ_MAX ? (uint8_t)size : READ_MAX;
         set_address(self->bytes, address);
-        if (!i2c1_start(EEPROM, self->bytes, ADDRESS_BYTES, bytes, part) || wait_for_bus() != I2C1_DONE) {
+        if (!i2c1_start(EEPROM, self->bytes, ADDRESS_BYTES, bytes, part)) {
+            return false;
+        }
+        const i2c1_status_t status = wait_for_bus();
+        if (may_be_writing(self, status)) {
+            continue;
+        }
+        if (status != I2C1_DONE) {
             return false;
         }
         address = (uint16_t)(address + part);

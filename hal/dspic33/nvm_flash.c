@@ -47,17 +47,15 @@ static const uint16_t nvm_flash_second[AREA_SIZE / 2]
 typedef enum { IDLE, ERASING, COPYING, FAILED } nvm_state_t;
 
 struct hal_nvm {
-    uint8_t state;     /* nvm_state_t */
-    uint8_t area;      /* 0 or 1 */
-    bool valid;        /* that area has a header */
-    uint16_t sequence; /* of that area */
-    uint16_t next;     /* first free slot of that area; SLOTS: none is */
-    uint8_t erased;    /* while erasing: pages of the other area */
-    uint16_t
-        copy_slot; /* while copying: the slot behind the one that is looked at next, from the newest down, */
-    uint16_t copy_next;        /* first free slot of the other area, */
-    uint8_t copied[PAGES / 8]; /* and the pages that are there already */
-    uint16_t page;             /* what is to be written */
+    uint8_t state;      /* nvm_state_t */
+    uint8_t area;       /* 0 or 1 */
+    bool valid;         /* that area has a header */
+    uint16_t sequence;  /* of that area */
+    uint16_t next;      /* first free slot of that area; SLOTS: none is */
+    uint8_t erased;     /* while erasing: pages of the other area */
+    uint16_t copy_slot; /* while copying: one more than the slot that is looked at next, newest first, */
+    uint16_t copy_next; /* and the first free slot of the other area */
+    uint16_t page;      /* what is to be written */
     uint8_t bytes[HAL_NVM_PAGE];
 };
 
@@ -232,7 +230,6 @@ static nvm_state_t erase_next(hal_nvm_t *self)
     self->erased++;
     self->copy_slot = self->valid ? self->next : 1;
     self->copy_next = 1;
-    memset(self->copied, 0, sizeof self->copied);
     return self->erased < PART_FLASH_STORE_PAGES ? ERASING : COPYING;
 }
 
@@ -254,13 +251,23 @@ static nvm_state_t switch_area(hal_nvm_t *self)
     return IDLE;
 }
 
+/* A newer entry of this page stands in the other area, which was empty before. A table would cost RAM. */
+static bool is_copied(const hal_nvm_t *self, uint16_t page)
+{
+    for (uint16_t slot = 1; slot < self->copy_next; slot++) {
+        if (slot_number(slot_at(self->area ^ 1u, slot)) == page) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* The page whose newest good entry this slot is; NOWHERE: it is none. */
 static uint16_t page_to_copy(const hal_nvm_t *self, uint16_t slot, uint8_t *bytes)
 {
     const uint32_t at = slot_at(self->area, slot);
     const uint16_t page = slot_number(at);
-    if (page >= PAGES || page == self->page || (self->copied[page / 8] >> page % 8 & 1u) != 0 ||
-        !read_slot(at, page, bytes)) {
+    if (page >= PAGES || page == self->page || is_copied(self, page) || !read_slot(at, page, bytes)) {
         return NOWHERE;
     }
     return page;
@@ -278,7 +285,6 @@ static nvm_state_t copy_some(hal_nvm_t *self)
         if (self->copy_next == SLOTS || !write_slot(slot_at(self->area ^ 1u, self->copy_next), page, bytes)) {
             return FAILED;
         }
-        self->copied[page / 8] = (uint8_t)(self->copied[page / 8] | 1u << page % 8);
         self->copy_next++;
     }
     return self->copy_slot > 1 ? COPYING : switch_area(self);

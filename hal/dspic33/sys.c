@@ -14,10 +14,11 @@ enum {
     RCON_WDTO = 0x0010,
     RCON_SWR = 0x0040,
     RCON_EXTR = 0x0080,
+    RCON_CM = 0x0200,
     RCON_IOPUWR = 0x4000,
     RCON_TRAPR = 0x8000,
     RCON_SLEEP_IDLE = 0x000C,
-    RCON_CAUSES = RCON_POR | RCON_BOR | RCON_WDTO | RCON_SWR | RCON_EXTR | RCON_IOPUWR | RCON_TRAPR
+    RCON_CAUSES = RCON_POR | RCON_BOR | RCON_WDTO | RCON_SWR | RCON_EXTR | RCON_CM | RCON_IOPUWR | RCON_TRAPR
 };
 
 static sys_fault_t sys_last_fault PART_KEPT;
@@ -52,7 +53,7 @@ void sys_start(void)
         sys_cause = SYS_RESET_BROWN_OUT;
     } else if ((flags & RCON_WDTO) != 0) {
         sys_cause = SYS_RESET_WATCHDOG;
-    } else if ((flags & RCON_IOPUWR) != 0) {
+    } else if ((flags & (RCON_IOPUWR | RCON_CM)) != 0) {
         sys_cause = SYS_RESET_ILLEGAL;
     } else {
         sys_cause = (flags & RCON_SWR) != 0 ? SYS_RESET_SOFTWARE : SYS_RESET_PIN;

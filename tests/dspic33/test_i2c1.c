@@ -113,6 +113,19 @@ static void test_bus_that_hangs_is_recovered_after_30_ms(void)
     TEST_ASSERT_EQUAL_INT(I2C1_DONE, finish());
 }
 
+/* The module sees a collision at once when it is to send a start while the data line is low. */
+static void test_device_that_drives_the_bus_in_between_is_clocked_free(void)
+{
+    fake.sda_held_clocks = 7;
+    fake_poke(PART_AT_PORT, 0);
+    TEST_ASSERT_TRUE(i2c1_start(EXPANDER, NULL, 0, NULL, 0));
+    fake_run_us(100);
+    TEST_ASSERT_EQUAL_INT(I2C1_FAILED, i2c1_status()); /* long before it has hung */
+    TEST_ASSERT_EQUAL_UINT(0, fake.sda_held_clocks);
+    TEST_ASSERT_TRUE(i2c1_start(EXPANDER, NULL, 0, NULL, 0));
+    TEST_ASSERT_EQUAL_INT(I2C1_DONE, finish());
+}
+
 static void test_device_that_drives_the_bus_at_the_start_is_clocked_free(void)
 {
     fake_power_on(false);
@@ -144,6 +157,7 @@ int main(void)
     RUN_TEST(test_nobody_answers);
     RUN_TEST(test_collision_ends_the_transfer);
     RUN_TEST(test_bus_that_hangs_is_recovered_after_30_ms);
+    RUN_TEST(test_device_that_drives_the_bus_in_between_is_clocked_free);
     RUN_TEST(test_device_that_drives_the_bus_at_the_start_is_clocked_free);
     RUN_TEST(test_shorted_bus_does_not_stop_the_program);
     return UNITY_END();

@@ -112,6 +112,33 @@ static void test_hung_bus_fails_and_recovers(void)
     TEST_ASSERT_TRUE(hal_nvm_read(nvm, 0, &byte, 1));
 }
 
+/* The processor alone was reset in the middle of a write: the EEPROM does not answer before it has ended. */
+static void test_read_after_a_reset_waits_for_the_write_before_it(void)
+{
+    hal_nvm_t *nvm = start(false);
+    uint8_t byte = 0;
+    fake.eeprom_write_us = 15000;
+    TEST_ASSERT_TRUE(hal_nvm_write(nvm, 7, (const uint8_t *)"w", 1));
+    fake_run_us(1000);
+    i2c1_open();
+    nvm = nvm_open();
+    TEST_ASSERT_TRUE(hal_nvm_read(nvm, 7, &byte, 1));
+    TEST_ASSERT_EQUAL_HEX8('w', byte);
+}
+
+/* It is waited for once, not with each of the many reads of a start. */
+static void test_missing_device_delays_the_start_by_20_ms_only(void)
+{
+    hal_nvm_t *nvm = start(false);
+    uint8_t byte;
+    fake.eeprom_present = false;
+    const uint64_t before_us = fake.now_us;
+    for (int i = 0; i < 10; i++) {
+        TEST_ASSERT_FALSE(hal_nvm_read(nvm, 0, &byte, 1));
+    }
+    TEST_ASSERT_UINT64_WITHIN(3000, 22000, fake.now_us - before_us);
+}
+
 static void test_read_waits_for_a_write(void)
 {
     hal_nvm_t *nvm = start(false);
@@ -131,5 +158,7 @@ int main(void)
     RUN_TEST(test_device_that_never_ends_its_write_fails);
     RUN_TEST(test_hung_bus_fails_and_recovers);
     RUN_TEST(test_read_waits_for_a_write);
+    RUN_TEST(test_read_after_a_reset_waits_for_the_write_before_it);
+    RUN_TEST(test_missing_device_delays_the_start_by_20_ms_only);
     return UNITY_END();
 }

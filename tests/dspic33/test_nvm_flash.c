@@ -121,6 +121,20 @@ static void test_full_area_moves_on_and_keeps_everything(void)
     TEST_ASSERT_TRUE(fake.flash_erases >= 5 * PART_FLASH_STORE_PAGES);
 }
 
+/* When the area is left, each of these pages has many entries in it: the newest goes along. */
+static void test_move_takes_the_newest_entry_of_each_page(void)
+{
+    hal_nvm_t *nvm = nvm_open();
+    uint8_t newest[5] = {0};
+    for (uint16_t i = 0; i < 3 * SLOTS; i++) {
+        newest[i % 5] = (uint8_t)(i + 1);
+        write_byte(nvm, (uint16_t)(i % 5 * 64), newest[i % 5]);
+        for (uint16_t page = 0; page < 5 && page <= i; page++) {
+            TEST_ASSERT_EQUAL_HEX8(newest[page], read_byte(nvm, (uint16_t)(page * 64)));
+        }
+    }
+}
+
 static void test_page_more_than_an_area_holds_fails_and_changes_nothing(void)
 {
     hal_nvm_t *nvm = nvm_open();
@@ -208,6 +222,7 @@ int main(void)
     RUN_TEST(test_writes_are_locked_again_and_interrupts_on);
     RUN_TEST(test_error_of_the_part_is_reported);
     RUN_TEST(test_full_area_moves_on_and_keeps_everything);
+    RUN_TEST(test_move_takes_the_newest_entry_of_each_page);
     RUN_TEST(test_page_more_than_an_area_holds_fails_and_changes_nothing);
     RUN_TEST(test_power_may_fail_at_any_operation);
     RUN_TEST(test_area_fits_the_polls_of_a_job);

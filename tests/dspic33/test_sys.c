@@ -54,11 +54,11 @@ static void test_crystal_that_does_not_start_is_noticed(void)
 
 static void test_cause_of_the_reset(void)
 {
-    static const uint16_t flags[] = {0x0003, 0x0002, 0x0080, 0x0010, 0x4000, 0x0040, 0x8000};
+    static const uint16_t flags[] = {0x0003, 0x0002, 0x0080, 0x0010, 0x4000, 0x0200, 0x0040, 0x8000};
     static const sys_reset_t causes[] = {SYS_RESET_POWER_ON, SYS_RESET_BROWN_OUT, SYS_RESET_PIN,
-                                         SYS_RESET_WATCHDOG, SYS_RESET_ILLEGAL,   SYS_RESET_SOFTWARE,
-                                         SYS_RESET_TRAP};
-    for (int i = 0; i < 7; i++) {
+                                         SYS_RESET_WATCHDOG, SYS_RESET_ILLEGAL,   SYS_RESET_ILLEGAL,
+                                         SYS_RESET_SOFTWARE, SYS_RESET_TRAP};
+    for (int i = 0; i < 8; i++) {
         fake_poke(0x0740, flags[i]);
         sys_start();
         TEST_ASSERT_EQUAL_INT(causes[i], sys_reset_cause());

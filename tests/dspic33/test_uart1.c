@@ -3,6 +3,7 @@
 #include <xc.h>
 
 #include "fake.h"
+#include "handlers.h"
 #include "uart1.h"
 #include "unity.h"
 
@@ -111,6 +112,18 @@ static void test_bytes_go_out_in_order(void)
     TEST_ASSERT_EQUAL_UINT(101, fake.uart_sent_count);
 }
 
+/* The handler may find nothing to do: it sent the byte before the write that it came with was over. */
+static void test_goes_on_after_a_handler_that_found_nothing(void)
+{
+    TEST_ASSERT_EQUAL_UINT(1, hal_uart_write(uart, (const uint8_t *)"a", 1));
+    fake_run_us(1000);
+    _U1TXInterrupt();
+    TEST_ASSERT_EQUAL_UINT(1, hal_uart_write(uart, (const uint8_t *)"b", 1));
+    fake_run_us(1000);
+    TEST_ASSERT_EQUAL_UINT(2, fake.uart_sent_count);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY("ab", fake.uart_sent, 2);
+}
+
 static void test_same_byte_goes_out_as_often_as_written(void)
 {
     static const uint8_t bytes[10] = {0};
@@ -141,6 +154,7 @@ int main(void)
     RUN_TEST(test_byte_with_framing_error_is_dropped);
     RUN_TEST(test_overrun_keeps_what_is_there_and_goes_on);
     RUN_TEST(test_bytes_go_out_in_order);
+    RUN_TEST(test_goes_on_after_a_handler_that_found_nothing);
     RUN_TEST(test_same_byte_goes_out_as_often_as_written);
     RUN_TEST(test_takes_no_more_than_20_ms_carry);
     return UNITY_END();

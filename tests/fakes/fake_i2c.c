@@ -12,6 +12,7 @@ static uint32_t left_us;
 static uint8_t sent_byte;
 static int device; /* that was addressed; -1: none */
 static bool reading;
+static bool acknowledged;    /* the last byte that was read: the device goes on driving the bus */
 static unsigned byte_number; /* since the address */
 static uint16_t pointer;     /* of the EEPROM, or register number of the expander */
 static uint16_t page_start;
@@ -72,6 +73,7 @@ static bool take_address(uint8_t byte)
 {
     const int called = byte >> 1;
     reading = (byte & 1u) != 0;
+    acknowledged = false;
     byte_number = 0;
     if (called == EEPROM && fake.eeprom_present && busy_us == 0) {
         device = EEPROM;
@@ -106,6 +108,10 @@ static void take_data(uint8_t byte)
 static void stop(void)
 {
     fake.i2c_stops++;
+    if (acknowledged) {
+        fake.misuses++;
+    }
+    acknowledged = false;
     device = -1;
     if (!page_pending) {
         return;
@@ -150,6 +156,9 @@ static void finish_operation(operation_t what)
         *fake_at(0x0200) = device == EEPROM ? fake.eeprom[pointer] : 0xFF;
         pointer = (uint16_t)((pointer + 1u) & 0x7FFFu);
         break;
+    case ACKNOWLEDGE:
+        acknowledged = (*fake_at(0x0206) & 0x0020) == 0;
+        break;
     case STOP:
         stop();
         set_status(0x8000, false); /* erratum: the acknowledgement is gone */
@@ -177,7 +186,7 @@ void fake_i2c_pass_us(uint32_t us)
     }
     const operation_t what = operation;
     operation = NOTHING;
-    if (fake.i2c_collides) {
+    if (fake.i2c_collides || (what == START && fake.sda_held_clocks != 0)) {
         fake.i2c_collides = false;
         *fake_at(0x0206) &= 0xFFE0u;
         set_status(0x0400, true);

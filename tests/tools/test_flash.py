@@ -105,6 +105,21 @@ def test_nothing_installed(tmp_path: Path, image: Path) -> None:
     assert "needs ipecmd.sh" in run(tmp_path, "--tool", "onboard", image).stderr
 
 
+def test_wrong_root_is_named(tmp_path: Path, image: Path) -> None:
+    root = tmp_path / "v6.00"
+    assert f"not in MPLABX_ROOT={root}" in run(root, image).stderr
+
+
+@pytest.mark.parametrize(
+    ("tool", "code"),
+    [("pickit3", "PK3"), ("pickit4", "PK4"), ("pickit5", "PK5"), ("snap", "SNAP"), ("onboard", "PKOB")],
+)
+def test_tools(tmp_path: Path, image: Path, tool: str, code: str) -> None:
+    install(tmp_path, "mplab_ipe/ipecmd.sh")
+    assert run(tmp_path, "--tool", tool, image).returncode == 0
+    assert (tmp_path / "log").read_text().split()[0] == f"-TP{code}"
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
@@ -118,6 +133,8 @@ def test_nothing_installed(tmp_path: Path, image: Path) -> None:
         (["--serial", "4294967295", "whole.hex", "--part", "33FJ64MC802"], "serial number '4294967295'"),
         (["--serial", "08", "whole.hex", "--part", "33FJ64MC802"], "serial number '08'"),
         (["--serial"], "--serial wants a value"),
+        (["--serial", "", "whole.hex", "--part", "33FJ64MC802"], "--serial wants a value"),
+        (["."], ".: cannot be read"),
         (["--fast", "whole.hex"], "unexpected argument '--fast'"),
     ],
 )

@@ -25,16 +25,16 @@ typedef struct {
 typedef void (*arb_observer_t)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
 
 typedef struct {
-    pdcp_arb_t arb;
-    arb_hostapi_t api;
-    arb_store_t store;
-    arb_nvm_t nvm;
-    arb_limb_t limb;
     const arb_port_t *port;
-    bool work;               /* something was handed in, or frames or bytes wait for room */
     uint32_t next_ms;        /* what arb_app_step returned last */
     arb_observer_t observer; /* NULL: nobody */
     void *observer_ctx;
+    bool work; /* something was handed in, or frames or bytes wait for room */
+    arb_nvm_t nvm;
+    arb_store_t store;
+    arb_limb_t limb;
+    arb_hostapi_t api;
+    pdcp_arb_t arb;
 } arb_app_t;
 
 /* Reads what is stored and starts. port must outlive the application. */

@@ -68,11 +68,11 @@ static void put_device(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind
 static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t number)
 {
     const pdcp_channel_t *input = &arb->bus.nodes.channels[number];
-    const bool removed =
-        input->link == PDCP_LINK_NONE && arb->link.input == number && arb->link.kind == PDCP_TODO_REMOVE;
+    const bool removed = input->link == PDCP_LINK_NONE && arb->bus.link.input == number &&
+                         arb->bus.link.kind == PDCP_TODO_REMOVE;
     uint8_t data[ARB_EVENT_DATA_MAX];
     if (removed) {
-        arb_host_put_channel(&data[0], &arb->link.old_source, arb->link.old_index);
+        arb_host_put_channel(&data[0], &arb->bus.link.old_source, arb->bus.link.old_index);
     } else {
         arb_host_put_channel(&data[0], &input->source, input->source_index);
     }

@@ -17,7 +17,6 @@
 #define ARB_HOSTRX_TIMEOUT_MS 100
 
 typedef struct {
-    uint8_t bytes[2 * ARB_HOST_HEADER + ARB_HOST_REQUEST_MAX + ARB_HOST_CRC];
     uint16_t len;
     bool overdue;        /* 100 ms without a byte: what is doubtful is decided now */
     uint16_t taken;      /* bytes of the request handed out last; they go with the next call */
@@ -27,6 +26,7 @@ typedef struct {
     uint32_t bad_crc8s;  /* messages whose CRC8 did not match, accepted or not */
     uint32_t bad_crc16s; /* and whose CRC8 did, but not the CRC16 */
     uint32_t given_up;   /* messages that stopped in the middle */
+    uint8_t bytes[2 * ARB_HOST_HEADER + ARB_HOST_REQUEST_MAX + ARB_HOST_CRC];
 } arb_hostrx_t;
 
 /* A request; payload points into the receiver and is valid until the next call. */

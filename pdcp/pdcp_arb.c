@@ -19,28 +19,28 @@ static void forget_deadlines(pdcp_arb_t *arb)
 }
 
 /* Nothing is known of the bus; what is remembered and counted stays. */
-static void forget_bus(pdcp_arb_t *arb, uint32_t now_ms)
+static void forget_bus(pdcp_arb_t *arb)
 {
     pdcp_nodes_init(&arb->bus.nodes);
     forget_deadlines(arb);
     pdcp_txq_init(&arb->bus.txq);
-    pdcp_link_init(&arb->link);
-    memset(arb->bind.reserved, 0, sizeof arb->bind.reserved);
+    pdcp_link_init(&arb->bus);
+    memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
     memset(arb->strangers, 0, sizeof arb->strangers);
-    arb->asked_ms = now_ms;
-    arb->started_ms = now_ms;
+    arb->asked_ms = arb->bus.now_ms;
+    arb->started_ms = arb->bus.now_ms;
     arb->young = true;
-    pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
 }
 
 void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx)
 {
     memset(arb, 0, sizeof *arb);
-    pdcp_bind_init(&arb->bind);
+    arb->bus.now_ms = now_ms;
     arb->bus.on_event = on_event;
     arb->bus.event_ctx = ctx;
     arb->spread_ms = (uint16_t)(serial % PDCP_STANDBY_SPREAD_MS);
-    forget_bus(arb, now_ms);
+    forget_bus(arb);
 }
 
 static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
@@ -50,27 +50,27 @@ static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
 
 static pdcp_node_t *node_of(pdcp_arb_t *arb, uint8_t node)
 {
-    return &arb->bus.nodes.nodes[node];
+    return pdcp_bus_node(&arb->bus, node);
 }
 
-static uint32_t silence_ms(const pdcp_node_t *node)
+static uint16_t silence_ms(const pdcp_node_t *node)
 {
-    return (uint32_t)node->beacon_ms * PDCP_BEACONS_MISSED;
+    return (uint16_t)(node->beacon_ms * PDCP_BEACONS_MISSED);
 }
 
-static void set_life(pdcp_arb_t *arb, uint8_t node, uint32_t deadline_ms)
+static void set_life(pdcp_arb_t *arb, uint8_t node, uint16_t in_ms)
 {
-    pdcp_timers_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_LIFE + node), deadline_ms);
+    pdcp_bus_wake(&arb->bus, (uint8_t)(PDCP_TIMER_LIFE + node), in_ms);
 }
 
 /* The beacon interval of a device may have become shorter: the deadline moves by itself only when it fires.
  */
-static void expect_life(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void expect_life(pdcp_arb_t *arb, uint8_t node)
 {
-    set_life(arb, node, now_ms + silence_ms(node_of(arb, node)));
+    set_life(arb, node, silence_ms(node_of(arb, node)));
 }
 
-static void host_ends(pdcp_arb_t *arb, uint32_t now_ms, pdcp_status_t status)
+static void host_ends(pdcp_arb_t *arb, pdcp_status_t status)
 {
     arb->host.active = false;
     arb->host.waiting = false;
@@ -79,72 +79,72 @@ static void host_ends(pdcp_arb_t *arb, uint32_t now_ms, pdcp_status_t status)
                                 .channel = arb->host.channel,
                                 .status = (int8_t)status,
                                 .len = arb->host.len};
-    arb->bus.on_event(arb->bus.event_ctx, now_ms, &event);
+    arb->bus.on_event(arb->bus.event_ctx, arb->bus.now_ms, &event);
 }
 
-static void reset_ends(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_status_t status)
+static void reset_ends(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 {
     if (node_of(arb, node)->reset_asked) {
         node_of(arb, node)->reset_asked = false;
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_RESET, node, PDCP_NONE, status);
+        pdcp_bus_tell(&arb->bus, PDCP_EVENT_RESET, node, PDCP_NONE, status);
     }
 }
 
 /* Takes a device out of service: whoever waits for it learns that it does not answer, its links become
  * inactive. */
-static void take_down(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void take_down(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     device->state = PDCP_NODE_LOST;
     device->setup_due = false;
     pdcp_request_cancel(&arb->bus, node);
-    pdcp_link_on_lost(&arb->link, &arb->bus, now_ms, node);
-    reset_ends(arb, now_ms, node, PDCP_ERR_NO_ANSWER);
+    pdcp_link_on_lost(&arb->bus, node);
+    reset_ends(arb, node, PDCP_ERR_NO_ANSWER);
     if (arb->host.active && arb->host.node == node) {
-        host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
+        host_ends(arb, PDCP_ERR_NO_ANSWER);
     }
 }
 
-static void begin_setup(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void begin_setup(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     device->setup_again = false;
-    device->heard_ms = now_ms;
+    device->heard_ms = arb->bus.now_ms;
     device->taken_back = false;
     pdcp_setup_start(&arb->bus, node);
-    expect_life(arb, now_ms, node);
+    expect_life(arb, node);
 }
 
-static void tell_lost(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void tell_lost(pdcp_arb_t *arb, uint8_t node)
 {
     if (node_of(arb, node)->beaconed) {
         node_of(arb, node)->beaconed = false;
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_LOST, node, PDCP_NONE, PDCP_OK);
+        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_LOST, node);
     }
 }
 
 /* The device is gone; its ids are kept for it for a while. */
-static void lose(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void lose(pdcp_arb_t *arb, uint8_t node)
 {
-    take_down(arb, now_ms, node);
+    take_down(arb, node);
     node_of(arb, node)->asked_again = false;
-    set_life(arb, node, now_ms + PDCP_LOST_KEPT_MS);
-    tell_lost(arb, now_ms, node);
+    set_life(arb, node, PDCP_LOST_KEPT_MS);
+    tell_lost(arb, node);
 }
 
-static void after_bind(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_bind_result_t result)
+static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
 {
     if (result != PDCP_BIND_GRANTED) {
         return;
     }
     if (node_of(arb, node)->state != PDCP_NODE_LOST) {
-        take_down(arb, now_ms, node); /* it was reset: what was known of its channels' state is gone */
-        tell_lost(arb, now_ms, node);
+        take_down(arb, node); /* it was reset: what was known of its channels' state is gone */
+        tell_lost(arb, node);
     }
-    begin_setup(arb, now_ms, node);
+    begin_setup(arb, node);
 }
 
-static void start_host_request(pdcp_arb_t *arb, uint32_t now_ms)
+static void start_host_request(pdcp_arb_t *arb)
 {
     pdcp_host_request_t *host = &arb->host;
     if (!host->waiting || !pdcp_request_is_idle(&arb->bus, host->node)) {
@@ -153,36 +153,35 @@ static void start_host_request(pdcp_arb_t *arb, uint32_t now_ms)
     host->waiting = false;
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
     if (host->raw) {
-        pdcp_request_raw(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->bytes, (uint8_t)host->size);
+        pdcp_request_raw(&arb->bus, host->node, PDCP_CLIENT_HOST, host->bytes, (uint8_t)host->size);
     } else if (host->code == PDCP_SET_PARAMETER) {
-        pdcp_request_set(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
-                         host->bytes, host->size);
-    } else if (host->code == PDCP_GET_PARAMETER) {
-        pdcp_request_get(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->channel, host->param,
+        pdcp_request_set(&arb->bus, host->node, PDCP_CLIENT_HOST, host->channel, host->param, host->bytes,
                          host->size);
+    } else if (host->code == PDCP_GET_PARAMETER) {
+        pdcp_request_get(&arb->bus, host->node, PDCP_CLIENT_HOST, host->channel, host->param, host->size);
     } else {
-        pdcp_request_command(&arb->bus, now_ms, host->node, PDCP_CLIENT_HOST, host->code, host->size);
+        pdcp_request_command(&arb->bus, host->node, PDCP_CLIENT_HOST, host->code, host->size);
     }
 }
 
 /* A device's place may have become free for its next request: the check of its identity comes first, then the
  * host, then its setup. */
-static void serve(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void serve(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     if (arb->host.waiting && arb->host.node == node && !device->asked_again) {
-        start_host_request(arb, now_ms);
+        start_host_request(arb);
     }
     if (!pdcp_request_is_idle(&arb->bus, node)) {
         return;
     }
     if (device->asked_again) {
-        pdcp_request_get(&arb->bus, now_ms, node, PDCP_CLIENT_BIND, 0, PDCP_DEV_VID_PID, PDCP_VALUE_MAX);
+        pdcp_request_get(&arb->bus, node, PDCP_CLIENT_BIND, 0, PDCP_DEV_VID_PID, PDCP_VALUE_MAX);
         pdcp_request_try_once(&arb->bus, node);
         return;
     }
     if (device->reset_asked) {
-        pdcp_request_command(&arb->bus, now_ms, node, PDCP_CLIENT_RESET, PDCP_RESET, 0);
+        pdcp_request_command(&arb->bus, node, PDCP_CLIENT_RESET, PDCP_RESET, 0);
         return;
     }
     const bool paused = pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node));
@@ -196,11 +195,11 @@ static void serve(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
         device->setup_due = true; /* the pause after a failed attempt is over */
     }
     if (device->setup_due) {
-        pdcp_setup_ask(&arb->bind, &arb->bus, now_ms, node);
+        pdcp_setup_ask(&arb->bus, node);
     }
 }
 
-static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
@@ -214,36 +213,36 @@ static void on_bind_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *f
     }
     uint8_t node;
     count(arb, PDCP_STAT_TAKEN);
-    arb->asked_ms = now_ms;
+    arb->asked_ms = arb->bus.now_ms;
     const pdcp_bind_result_t result =
-        pdcp_bind_on_request(&arb->bind, &arb->bus, now_ms, &msg.identity, pdcp_id_node(frame->id), &node);
-    after_bind(arb, now_ms, node, result);
+        pdcp_bind_on_request(&arb->bus, &msg.identity, pdcp_id_node(frame->id), &node);
+    after_bind(arb, node, result);
     if (node != PDCP_NONE) {
-        serve(arb, now_ms, node);
+        serve(arb, node);
     }
 }
 
 /* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
-static bool is_young(pdcp_arb_t *arb, uint32_t now_ms)
+static bool is_young(pdcp_arb_t *arb)
 {
-    arb->young = arb->young && pdcp_time_before(now_ms, arb->started_ms + PDCP_YOUNG_MS);
+    arb->young = arb->young && pdcp_time_before(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS);
     return arb->young;
 }
 
-static void forget_strangers(pdcp_arb_t *arb, uint32_t now_ms)
+static void forget_strangers(pdcp_arb_t *arb)
 {
     for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (pdcp_time_reached(now_ms, arb->strangers[i].until_ms)) {
+        if (pdcp_time_reached(arb->bus.now_ms, arb->strangers[i].until_ms)) {
             arb->strangers[i].node_id = 0;
         }
     }
 }
 
 /* Tells the device with this id to reset, at most once a second (D-BUS-15). It will then bind. */
-static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
+static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
 {
     pdcp_stranger_t *entry = NULL;
-    forget_strangers(arb, now_ms);
+    forget_strangers(arb);
     for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
         if (arb->strangers[i].node_id == id) {
             return;
@@ -256,7 +255,7 @@ static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
         return; /* its turn comes within a second: nobody is told twice */
     }
     entry->node_id = id;
-    entry->until_ms = now_ms + PDCP_STRANGER_PAUSE_MS;
+    entry->until_ms = arb->bus.now_ms + PDCP_STRANGER_PAUSE_MS;
     const pdcp_msg_t reset = {.code = PDCP_RESET};
     if (pdcp_bus_send(&arb->bus, PDCP_PRIORITY_NORMAL, id, &reset)) {
         count(arb, PDCP_STAT_STRANGER_RESET);
@@ -264,58 +263,58 @@ static void reset_stranger(pdcp_arb_t *arb, uint32_t now_ms, uint8_t id)
 }
 
 /* A frame from an id that is not bound. True: there is something to be sent. */
-static bool on_stranger(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
     const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
     count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (!is_beacon || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb, now_ms)) {
+    if (!is_beacon || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb)) {
         return false;
     }
-    reset_stranger(arb, now_ms, id);
+    reset_stranger(arb, id);
     return true;
 }
 
 /* D-BUS-12: this arbitrator falls silent; the host, if it waits, is told. */
-static void go_silent(pdcp_arb_t *arb, uint32_t now_ms)
+static void go_silent(pdcp_arb_t *arb)
 {
     const bool host_waits = arb->host.active;
-    const bool wish_waits = pdcp_link_wish_waits(&arb->link);
+    const bool wish_waits = pdcp_link_wish_waits(&arb->bus);
     arb->silent = true;
-    forget_bus(arb, now_ms);
+    forget_bus(arb);
     if (host_waits) {
-        host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
+        host_ends(arb, PDCP_ERR_NO_ANSWER);
     }
     if (wish_waits) {
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, PDCP_NONE, PDCP_ERR_NO_ANSWER);
+        pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
-    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_SILENT, PDCP_NONE, PDCP_NONE, PDCP_OK);
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
 }
 
 /* D-BUS-12: heard soon after the own start, another arbitrator was there first; heard later, this one was. */
-static void on_foreign_beacon(pdcp_arb_t *arb, uint32_t now_ms)
+static void on_foreign_beacon(pdcp_arb_t *arb)
 {
-    const bool again = arb->foreign && pdcp_time_before(now_ms, arb->foreign_ms + PDCP_STANDBY_MS);
+    const bool again = arb->foreign && pdcp_time_before(arb->bus.now_ms, arb->foreign_ms + PDCP_STANDBY_MS);
     count(arb, PDCP_STAT_FOREIGN_BEACON);
     arb->foreign = true;
-    arb->foreign_ms = now_ms;
-    if (!arb->silent && is_young(arb, now_ms)) {
-        go_silent(arb, now_ms);
+    arb->foreign_ms = arb->bus.now_ms;
+    if (!arb->silent && is_young(arb)) {
+        go_silent(arb);
     } else if (!arb->silent && !again) {
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_FOREIGN, PDCP_NONE, PDCP_NONE, PDCP_OK);
+        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_FOREIGN, PDCP_NONE);
     }
     if (arb->silent) {
-        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms + PDCP_STANDBY_MS + arb->spread_ms);
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, (uint16_t)(PDCP_STANDBY_MS + arb->spread_ms));
     }
 }
 
-static void on_arbitrator_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
+static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         count(arb, PDCP_STAT_DROP_UNUSED_ID);
     } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && frame->dlc == 1 &&
                frame->data[0] == PDCP_BEACON) {
-        on_foreign_beacon(arb, now_ms);
+        on_foreign_beacon(arb);
     } else {
         count(arb, PDCP_STAT_DROP_ARBITRATOR);
     }
@@ -328,7 +327,7 @@ static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
 }
 
 /* True: it was the first one, or the device was lost. */
-static bool on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static bool on_beacon(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     count(arb, PDCP_STAT_TAKEN);
@@ -336,23 +335,23 @@ static bool on_beacon(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
         return false;
     }
     if (device->state == PDCP_NODE_LOST) {
-        begin_setup(arb, now_ms, node); /* reads who it is before anything else (D-BUS-15) */
+        begin_setup(arb, node); /* reads who it is before anything else (D-BUS-15) */
         device->taken_back = true;
-        serve(arb, now_ms, node);
+        serve(arb, node);
     }
     device->beaconed = true;
-    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_BOUND, node, PDCP_NONE, PDCP_OK);
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_BOUND, node);
     return true;
 }
 
 /* The host has written a parameter that stands in the tables (D-BUS-25). */
-static void host_has_set(pdcp_arb_t *arb, uint32_t now_ms, const uint8_t *value, uint16_t len)
+static void host_has_set(pdcp_arb_t *arb, const uint8_t *value, uint16_t len)
 {
     const pdcp_host_request_t *host = &arb->host;
     if (host->channel == 0) {
         pdcp_setup_take_time(node_of(arb, host->node), host->param, value,
                              (uint8_t)(len < PDCP_VALUE_MAX ? len : PDCP_VALUE_MAX));
-        expect_life(arb, now_ms, host->node);
+        expect_life(arb, host->node);
         return;
     }
     const uint8_t channel = pdcp_nodes_channel(&arb->bus.nodes, host->node, host->channel);
@@ -362,30 +361,30 @@ static void host_has_set(pdcp_arb_t *arb, uint32_t now_ms, const uint8_t *value,
 }
 
 /* The answer to a frame that the host has passed through: the whole of it goes back. */
-static void host_on_raw(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
+static void host_on_raw(pdcp_arb_t *arb, const pdcp_reply_t *reply)
 {
     pdcp_host_request_t *host = &arb->host;
     const uint8_t node = host->node;
     const bool success = reply->status == PDCP_OK && (reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
     if (success && host->code == PDCP_SET_PARAMETER && host->size >= 3) {
-        host_has_set(arb, now_ms, &host->bytes[3], (uint16_t)(host->size - 3));
+        host_has_set(arb, &host->bytes[3], (uint16_t)(host->size - 3));
     }
     if (reply->status == PDCP_OK) {
         memcpy(host->bytes, reply->bytes, reply->len);
         host->len = reply->len;
     }
-    host_ends(arb, now_ms, (pdcp_status_t)reply->status);
+    host_ends(arb, (pdcp_status_t)reply->status);
     if (success && host->code == PDCP_RESET) {
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_RESET, node, PDCP_NONE, PDCP_OK);
-        lose(arb, now_ms, node);
+        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_RESET, node);
+        lose(arb, node);
     }
 }
 
-static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *reply)
+static void host_on_reply(pdcp_arb_t *arb, const pdcp_reply_t *reply)
 {
     pdcp_host_request_t *host = &arb->host;
     if (host->raw) {
-        host_on_raw(arb, now_ms, reply);
+        host_on_raw(arb, reply);
         return;
     }
     if (host->code == PDCP_GET_PARAMETER && reply->len != 0 && reply->offset + reply->len <= host->size) {
@@ -393,72 +392,72 @@ static void host_on_reply(pdcp_arb_t *arb, uint32_t now_ms, const pdcp_reply_t *
         host->len = (uint16_t)(reply->offset + reply->len);
     }
     if (host->code == PDCP_SET_PARAMETER && reply->status == PDCP_OK) {
-        host_has_set(arb, now_ms, host->bytes, host->size);
+        host_has_set(arb, host->bytes, host->size);
     }
     if (reply->done && reply->offset == 0 && reply->len == 0) {
         host->len = 0; /* a transfer that began anew may have ended empty */
     }
     if (reply->done) {
-        host_ends(arb, now_ms, (pdcp_status_t)reply->status);
+        host_ends(arb, (pdcp_status_t)reply->status);
     }
 }
 
 /* A device that has answered Reset Device is lost until it binds again. */
-static void reset_on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, pdcp_status_t status)
+static void reset_on_reply(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 {
-    reset_ends(arb, now_ms, node, status);
+    reset_ends(arb, node, status);
     if (status == PDCP_OK) {
-        lose(arb, now_ms, node);
+        lose(arb, node);
     }
 }
 
 /* The check of a device whose identity has asked again (D-BUS-6): any answer shows that the asking one is
  * another. True: it was reset and is bound afresh; whoever waited for its reply has been told. */
-static bool conclude_check(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+static bool conclude_check(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
     if (!node_of(arb, node)->asked_again || !reply->done) {
         return false;
     }
     const bool answered = reply->status != PDCP_ERR_NO_ANSWER;
-    const pdcp_bind_result_t result = pdcp_bind_after_check(&arb->bind, &arb->bus, now_ms, node, answered);
-    after_bind(arb, now_ms, node, result);
+    const pdcp_bind_result_t result = pdcp_bind_after_check(&arb->bus, node, answered);
+    after_bind(arb, node, result);
     if (!answered && result == PDCP_BIND_SUGGESTED) { /* it was reset: known without a second check */
-        lose(arb, now_ms, node);
+        lose(arb, node);
     }
     return !answered;
 }
 
-static void on_reply(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
-    if (conclude_check(arb, now_ms, node, reply)) {
+    if (conclude_check(arb, node, reply)) {
         return;
     }
     switch ((pdcp_client_t)reply->client) {
     case PDCP_CLIENT_SETUP:
-        if (pdcp_setup_on_reply(&arb->bus, now_ms, node, reply) == PDCP_ERR_UNKNOWN &&
+        if (pdcp_setup_on_reply(&arb->bus, node, reply) == PDCP_ERR_UNKNOWN &&
             node_of(arb, node)->taken_back) {
-            reset_stranger(arb, now_ms, node_of(arb, node)->node_id);
-            lose(arb, now_ms, node);
+            reset_stranger(arb, node_of(arb, node)->node_id);
+            lose(arb, node);
             return;
         }
         if (reply->channel == 0 && reply->param == PDCP_DEV_BEACON_INTERVAL) {
-            expect_life(arb, now_ms, node);
+            expect_life(arb, node);
         }
         if (node_of(arb, node)->state == PDCP_NODE_FAILED) {
-            arb->link.due = true; /* an Update Data Channel may have waited for it */
+            arb->bus.link.due = true; /* an Update Data Channel may have waited for it */
         }
         if (reply->done && node_of(arb, node)->state == PDCP_NODE_READY) {
-            pdcp_link_on_ready(&arb->link, &arb->bus, node);
+            pdcp_link_on_ready(&arb->bus, node);
         }
         break;
     case PDCP_CLIENT_LINK:
-        pdcp_link_on_reply(&arb->link, &arb->bus, now_ms, reply);
+        pdcp_link_on_reply(&arb->bus, reply);
         break;
     case PDCP_CLIENT_HOST:
-        host_on_reply(arb, now_ms, reply);
+        host_on_reply(arb, reply);
         break;
     case PDCP_CLIENT_RESET:
-        reset_on_reply(arb, now_ms, node, (pdcp_status_t)reply->status);
+        reset_on_reply(arb, node, (pdcp_status_t)reply->status);
         break;
     default:
         break;
@@ -479,14 +478,14 @@ static bool is_deprecated(uint8_t code)
            (request >= PDCP_IND_GET_PARAMETER && request <= PDCP_SET_NODE_ID);
 }
 
-static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can_frame_t *frame)
+static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
     if (pdcp_request_on_frame(&arb->bus, node, frame, &reply)) {
         count(arb, PDCP_STAT_TAKEN);
-        on_reply(arb, now_ms, node, &reply);
-        serve(arb, now_ms, node);
+        on_reply(arb, node, &reply);
+        serve(arb, node);
         return;
     }
     const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
@@ -500,29 +499,30 @@ static void on_message(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node, const can
         count(arb, PDCP_STAT_DROP_DIRECTION);
     } else if (msg.code == PDCP_UPDATE_CHANNEL) {
         count(arb, PDCP_STAT_TAKEN);
-        pdcp_link_on_update(&arb->link, &arb->bus, node, msg.channel);
+        pdcp_link_on_update(&arb->bus, node, msg.channel);
     } else {
         const uint32_t late = arb->bus.stats[PDCP_STAT_DROP_LATE];
-        const bool replied = pdcp_request_on_message(&arb->bus, now_ms, node, &msg, &reply);
+        const bool replied = pdcp_request_on_message(&arb->bus, node, &msg, &reply);
         if (arb->bus.stats[PDCP_STAT_DROP_LATE] == late) {
             count(arb, PDCP_STAT_TAKEN);
         }
         if (replied) {
-            on_reply(arb, now_ms, node, &reply);
-            serve(arb, now_ms, node);
+            on_reply(arb, node, &reply);
+            serve(arb, node);
         }
     }
 }
 
 bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
 {
+    arb->bus.now_ms = now_ms;
     count(arb, PDCP_STAT_RX);
     if (frame->kind != CAN_FRAME_BASE) {
         on_other_kind(arb, frame);
         return false;
     }
     if (pdcp_id_from_arbitrator(frame->id)) {
-        on_arbitrator_frame(arb, now_ms, frame);
+        on_arbitrator_frame(arb, frame);
         return arb->silent;
     }
     if (arb->silent) {
@@ -530,13 +530,13 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return false;
     }
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
-        on_bind_frame(arb, now_ms, frame);
+        on_bind_frame(arb, frame);
         return true;
     }
     uint8_t node;
     const bool is_device = pdcp_nodes_owner(&arb->bus.nodes, pdcp_id_node(frame->id), &node);
     if (node >= PDCP_DEVICES_MAX) {
-        return on_stranger(arb, now_ms, frame);
+        return on_stranger(arb, frame);
     }
     node_of(arb, node)->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     if (!is_device) {
@@ -544,107 +544,108 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return false;
     }
     if (frame->dlc == 1 && frame->data[0] == PDCP_BEACON) {
-        return on_beacon(arb, now_ms, node); /* by far the most frequent: without decoding */
+        return on_beacon(arb, node); /* by far the most frequent: without decoding */
     }
-    on_message(arb, now_ms, node, frame);
+    on_message(arb, node, frame);
     return true;
 }
 
-static void send_beacon(pdcp_arb_t *arb, uint32_t now_ms)
+static void send_beacon(pdcp_arb_t *arb)
 {
     const pdcp_msg_t beacon = {.code = PDCP_BEACON};
     (void)pdcp_bus_send(&arb->bus, PDCP_PRIORITY_HIGH, PDCP_NODE_BROADCAST, &beacon);
-    pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_BEACON, now_ms + PDCP_BEACON_MS);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, PDCP_BEACON_MS);
 }
 
 /* The beacon's deadline is also the end of the standby: long enough no other arbitrator was heard (D-BUS-12).
  */
-static void on_beacon_deadline(pdcp_arb_t *arb, uint32_t now_ms)
+static void on_beacon_deadline(pdcp_arb_t *arb)
 {
-    (void)is_young(arb, now_ms);
-    forget_strangers(arb, now_ms);
-    pdcp_bind_on_time(&arb->bind, now_ms);
+    (void)is_young(arb);
+    forget_strangers(arb);
+    pdcp_bind_on_time(&arb->bus);
     if (arb->silent) {
         arb->silent = false;
         arb->foreign = false;
-        forget_bus(arb, now_ms);
-        pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_STARTED, PDCP_NONE, PDCP_NONE, PDCP_OK);
+        forget_bus(arb);
+        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
     }
-    send_beacon(arb, now_ms);
+    send_beacon(arb);
 }
 
-static void on_life_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
-    const uint32_t lost_ms = device->heard_ms + silence_ms(device);
+    const uint32_t unheard_ms = arb->bus.now_ms - device->heard_ms;
     if (device->state == PDCP_NODE_LOST) {
         pdcp_nodes_remove(&arb->bus.nodes, node);
-    } else if (pdcp_time_before(now_ms, lost_ms)) {
-        set_life(arb, node, lost_ms);
+    } else if (unheard_ms < silence_ms(device)) {
+        set_life(arb, node, (uint16_t)(silence_ms(device) - unheard_ms));
     } else {
         count(arb, PDCP_STAT_LOST);
-        lose(arb, now_ms, node);
+        lose(arb, node);
     }
 }
 
 /* D-API-10: a request of the host, or a link, that cannot have its turn soon is given up, so that the host
  * has its answer in time. */
-static void limit_host_wait(pdcp_arb_t *arb, uint32_t now_ms)
+static void limit_host_wait(pdcp_arb_t *arb)
 {
-    const bool waits = arb->host.waiting || arb->link.wish_input != PDCP_NONE;
+    const bool waits = arb->host.waiting || arb->bus.link.wish_input != PDCP_NONE;
     const bool limited = pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_HOST);
     if (waits && !limited) {
-        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_HOST, now_ms + PDCP_HOST_WAIT_MS);
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_HOST, PDCP_HOST_WAIT_MS);
     } else if (!waits && limited) {
         pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
     }
 }
 
-static void on_host_deadline(pdcp_arb_t *arb, uint32_t now_ms)
+static void on_host_deadline(pdcp_arb_t *arb)
 {
     if (arb->host.waiting) {
-        host_ends(arb, now_ms, PDCP_ERR_BUSY);
+        host_ends(arb, PDCP_ERR_BUSY);
     }
-    pdcp_link_forget_wish(&arb->link, &arb->bus, now_ms, PDCP_ERR_BUSY);
+    pdcp_link_forget_wish(&arb->bus, PDCP_ERR_BUSY);
 }
 
-static void on_request_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void on_request_deadline(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_reply_t reply;
-    if (pdcp_request_on_deadline(&arb->bus, now_ms, node, &reply)) {
-        on_reply(arb, now_ms, node, &reply);
+    if (pdcp_request_on_deadline(&arb->bus, node, &reply)) {
+        on_reply(arb, node, &reply);
     }
-    serve(arb, now_ms, node);
+    serve(arb, node);
 }
 
-static void on_deadline(pdcp_arb_t *arb, uint32_t now_ms, uint8_t timer)
+static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 {
     if (timer == PDCP_TIMER_BEACON) {
-        on_beacon_deadline(arb, now_ms);
+        on_beacon_deadline(arb);
     } else if (timer == PDCP_TIMER_LINK) {
-        pdcp_link_on_ready(&arb->link, &arb->bus, PDCP_NONE);
+        pdcp_link_on_ready(&arb->bus, PDCP_NONE);
     } else if (timer == PDCP_TIMER_HOST) {
-        on_host_deadline(arb, now_ms);
+        on_host_deadline(arb);
     } else if (timer == PDCP_TIMER_RECOVERY) {
         arb->restart = true;
     } else if (timer >= PDCP_TIMER_LIFE) {
-        on_life_deadline(arb, now_ms, (uint8_t)(timer - PDCP_TIMER_LIFE));
+        on_life_deadline(arb, (uint8_t)(timer - PDCP_TIMER_LIFE));
     } else {
-        on_request_deadline(arb, now_ms, timer);
+        on_request_deadline(arb, timer);
     }
 }
 
 uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
 {
     uint8_t timer;
+    arb->bus.now_ms = now_ms;
     while (pdcp_timers_take_due(&arb->bus.timers, now_ms, &timer)) {
-        on_deadline(arb, now_ms, timer);
+        on_deadline(arb, timer);
     }
     if (arb->host.waiting) {
-        start_host_request(arb, now_ms);
+        start_host_request(arb);
     }
-    pdcp_link_step(&arb->link, &arb->bus, now_ms);
-    limit_host_wait(arb, now_ms);
+    pdcp_link_step(&arb->bus);
+    limit_host_wait(arb);
     return pdcp_timers_next_ms(&arb->bus.timers, now_ms);
 }
 
@@ -728,17 +729,18 @@ pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data,
 void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms)
 {
     uint8_t freed = PDCP_NONE;
+    arb->bus.now_ms = now_ms;
     if (arb->host.active) {
         if (!arb->host.waiting) {
             freed = arb->host.node;
             pdcp_request_cancel(&arb->bus, freed);
         }
-        host_ends(arb, now_ms, PDCP_ERR_NO_ANSWER);
+        host_ends(arb, PDCP_ERR_NO_ANSWER);
     } else {
-        freed = pdcp_link_give_up_wish(&arb->link, &arb->bus, now_ms);
+        freed = pdcp_link_give_up_wish(&arb->bus);
     }
     if (freed != PDCP_NONE) {
-        serve(arb, now_ms, freed);
+        serve(arb, freed);
     }
 }
 
@@ -750,20 +752,22 @@ bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 
 bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
+    arb->bus.now_ms = now_ms;
     if (!is_bound(arb, node)) {
         return false;
     }
     node_of(arb, node)->reset_asked = true;
-    serve(arb, now_ms, node);
+    serve(arb, node);
     return true;
 }
 
 void pdcp_arb_withdraw_resets(pdcp_arb_t *arb, uint32_t now_ms)
 {
+    arb->bus.now_ms = now_ms;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         const pdcp_request_t *request = &node_of(arb, i)->request;
         if (request->state == PDCP_REQUEST_IDLE || request->client != PDCP_CLIENT_RESET) {
-            reset_ends(arb, now_ms, i, PDCP_ERR_BUSY);
+            reset_ends(arb, i, PDCP_ERR_BUSY);
         }
     }
 }
@@ -773,6 +777,7 @@ void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state)
     if (state == arb->recovery.state) {
         return;
     }
+    arb->bus.now_ms = now_ms;
     const uint16_t pause_ms = pdcp_recovery_on_state(&arb->recovery, now_ms, state);
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_RECOVERY);
     if (pause_ms != 0) {
@@ -780,9 +785,9 @@ void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state)
         arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
         pdcp_txq_init(
             &arb->bus.txq); /* when the bus is back they would be stale; requests repeat themselves */
-        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_RECOVERY, now_ms + pause_ms);
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_RECOVERY, pause_ms);
     }
-    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_STATE, PDCP_NONE, PDCP_NONE, (pdcp_status_t)state);
+    pdcp_bus_tell(&arb->bus, PDCP_EVENT_STATE, PDCP_NONE, PDCP_NONE, (pdcp_status_t)state);
 }
 
 bool pdcp_arb_take_restart(pdcp_arb_t *arb)
@@ -803,7 +808,7 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
     if (channels[output].node == channels[input].node) {
         return PDCP_ERR_OWN;
     }
-    return pdcp_link_wish(&arb->link, output, input) ? PDCP_OK : PDCP_ERR_BUSY;
+    return pdcp_link_wish(&arb->bus, output, input) ? PDCP_OK : PDCP_ERR_BUSY;
 }
 
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
@@ -813,21 +818,22 @@ bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
         channels[input].link == PDCP_LINK_NONE) {
         return false;
     }
-    pdcp_link_remove(&arb->link, &arb->bus, input);
+    pdcp_link_remove(&arb->bus, input);
     return true;
 }
 
 void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored)
 {
-    arb->link.planned = true;
-    arb->link.stored = stored;
+    arb->bus.link.planned = true;
+    arb->bus.link.stored = stored;
 }
 
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
+    arb->bus.now_ms = now_ms;
     if (input < PDCP_CHANNELS_MAX && arb->bus.nodes.channels[input].node != PDCP_NONE &&
         arb->bus.nodes.channels[input].link == PDCP_LINK_ACTIVE) {
-        pdcp_link_rest(&arb->link, &arb->bus, now_ms, input);
+        pdcp_link_rest(&arb->bus, input);
     }
 }
 
@@ -837,17 +843,18 @@ void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pd
     if (channel->link != PDCP_LINK_NONE) {
         return;
     }
+    arb->bus.now_ms = now_ms;
     channel->source = source->identity;
     channel->source_index = source->index;
     channel->source_type = source->type;
     channel->source_profile = source->profile;
     channel->link = PDCP_LINK_INACTIVE;
-    pdcp_bus_tell(&arb->bus, now_ms, PDCP_EVENT_LINK, channel->node, input, PDCP_OK);
+    pdcp_bus_tell(&arb->bus, PDCP_EVENT_LINK, channel->node, input, PDCP_OK);
 }
 
 bool pdcp_arb_links_settled(const pdcp_arb_t *arb)
 {
-    return pdcp_link_is_settled(&arb->link, &arb->bus);
+    return pdcp_link_is_settled(&arb->bus);
 }
 
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)

@@ -13,9 +13,7 @@
 #include <stdint.h>
 
 #include "can_frame.h"
-#include "pdcp_bind.h"
 #include "pdcp_bus.h"
-#include "pdcp_link.h"
 #include "pdcp_recovery.h"
 
 /* The host's request to a device; one at a time. */
@@ -51,18 +49,16 @@ typedef struct {
 typedef struct {
     uint32_t asked_ms;   /* when a device asked to bind last, or the start */
     uint32_t started_ms; /* means something while young */
-    bool young;          /* in its first PDCP_YOUNG_MS */
     uint32_t foreign_ms; /* when another arbitrator was heard last */
     uint16_t spread_ms;  /* of the standby, from the serial number */
+    bool young;          /* in its first PDCP_YOUNG_MS */
     bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */
     bool silent;         /* on standby (D-BUS-12) */
     bool restart;        /* the controller is to be restarted */
     pdcp_recovery_t recovery;
     pdcp_bus_t bus;
-    pdcp_link_t link;
     pdcp_host_request_t host;
     pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
-    pdcp_bind_t bind;
 } pdcp_arb_t;
 
 /* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).

@@ -2,12 +2,8 @@
 
 #include <string.h>
 
+#include "pdcp_bus.h"
 #include "pdcp_time.h"
-
-void pdcp_bind_init(pdcp_bind_t *bind)
-{
-    memset(bind, 0, sizeof *bind);
-}
 
 static bool is_node_id(uint8_t id)
 {
@@ -79,11 +75,11 @@ static bool remember(pdcp_bind_t *bind, const pdcp_identity_t *identity, uint8_t
 }
 
 /* Is the id kept for another than identity (NULL: for anybody)? */
-static bool is_reserved(const pdcp_bind_t *bind, uint32_t now_ms, uint8_t id, const pdcp_identity_t *identity)
+static bool is_reserved(const pdcp_bus_t *bus, uint8_t id, const pdcp_identity_t *identity)
 {
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
-        const pdcp_reserved_t *reserved = &bind->reserved[i];
-        if (reserved->node_id == id && pdcp_time_before(now_ms, reserved->until_ms) &&
+        const pdcp_reserved_t *reserved = &bus->bind.reserved[i];
+        if (reserved->node_id == id && pdcp_time_before(bus->now_ms, reserved->until_ms) &&
             (identity == NULL || !pdcp_identity_equal(&reserved->identity, identity))) {
             return true;
         }
@@ -92,11 +88,11 @@ static bool is_reserved(const pdcp_bind_t *bind, uint32_t now_ms, uint8_t id, co
 }
 
 /* Reserves the id, in the entry that the identity has already, a free one, or the one that ends first. */
-static void reserve(pdcp_bind_t *bind, uint32_t now_ms, const pdcp_identity_t *identity, uint8_t id)
+static void reserve(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t id)
 {
-    pdcp_reserved_t *best = &bind->reserved[0];
+    pdcp_reserved_t *best = &bus->bind.reserved[0];
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
-        pdcp_reserved_t *entry = &bind->reserved[i];
+        pdcp_reserved_t *entry = &bus->bind.reserved[i];
         if (entry->node_id != 0 && pdcp_identity_equal(&entry->identity, identity)) {
             best = entry;
             break;
@@ -108,48 +104,49 @@ static void reserve(pdcp_bind_t *bind, uint32_t now_ms, const pdcp_identity_t *i
     }
     best->identity = *identity;
     best->node_id = id;
-    best->until_ms = now_ms + PDCP_BIND_TIMEOUT_MS;
+    best->until_ms = bus->now_ms + PDCP_BIND_TIMEOUT_MS;
 }
 
-void pdcp_bind_on_time(pdcp_bind_t *bind, uint32_t now_ms)
+void pdcp_bind_on_time(pdcp_bus_t *bus)
 {
+    pdcp_reserved_t *reserved = bus->bind.reserved;
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
-        if (pdcp_time_reached(now_ms, bind->reserved[i].until_ms)) {
-            bind->reserved[i].node_id = 0;
+        if (pdcp_time_reached(bus->now_ms, reserved[i].until_ms)) {
+            reserved[i].node_id = 0;
         }
     }
 }
 
-static void release_reserved(pdcp_bind_t *bind, uint32_t now_ms, const pdcp_identity_t *identity)
+static void release_reserved(pdcp_bus_t *bus, const pdcp_identity_t *identity)
 {
-    pdcp_bind_on_time(bind, now_ms);
+    pdcp_reserved_t *reserved = bus->bind.reserved;
+    pdcp_bind_on_time(bus);
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
-        if (pdcp_identity_equal(&bind->reserved[i].identity, identity)) {
-            bind->reserved[i].node_id = 0;
+        if (pdcp_identity_equal(&reserved[i].identity, identity)) {
+            reserved[i].node_id = 0;
         }
     }
 }
 
-static bool is_free(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms, uint8_t id,
-                    const pdcp_identity_t *identity)
+static bool is_free(const pdcp_bus_t *bus, uint8_t id, const pdcp_identity_t *identity)
 {
-    return is_node_id(id) && bus->nodes.owner[id] == 0 && !is_reserved(bind, now_ms, id, identity);
+    return is_node_id(id) && bus->nodes.owner[id] == 0 && !is_reserved(bus, id, identity);
 }
 
 /* The lowest free id that nobody is remembered with; while there is none, that of the identity that was away
  * longest. */
-static uint8_t pick_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms,
-                       const pdcp_identity_t *identity)
+static uint8_t pick_id(const pdcp_bus_t *bus, const pdcp_identity_t *identity)
 {
+    const pdcp_bind_t *bind = &bus->bind;
     for (uint16_t i = PDCP_NODE_MIN; i <= (uint16_t)PDCP_NODE_MAX; i++) {
         const uint8_t id = (uint8_t)i;
-        if (is_free(bind, bus, now_ms, id, identity) && !is_remembered(bind, id)) {
+        if (is_free(bus, id, identity) && !is_remembered(bind, id)) {
             return id;
         }
     }
     for (uint8_t i = bind->remembered_count; i-- > 0;) {
         const uint8_t id = bind->remembered[i].node_id;
-        if (is_free(bind, bus, now_ms, id, identity)) {
+        if (is_free(bus, id, identity)) {
             return id;
         }
     }
@@ -157,24 +154,24 @@ static uint8_t pick_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t 
 }
 
 /* The id that this identity is to have: its old one, the one it asks for, or any (D-BUS-6). */
-static uint8_t choose_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms,
-                         const pdcp_identity_t *identity, uint8_t asked)
+static uint8_t choose_id(const pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked)
 {
+    const pdcp_bind_t *bind = &bus->bind;
     const uint8_t old = remembered_id(bind, identity);
-    if (old != 0 && is_free(bind, bus, now_ms, old, identity)) {
+    if (old != 0 && is_free(bus, old, identity)) {
         return old;
     }
-    if (is_free(bind, bus, now_ms, asked, identity) && !is_remembered(bind, asked)) {
+    if (is_free(bus, asked, identity) && !is_remembered(bind, asked)) {
         return asked;
     }
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
         const pdcp_reserved_t *own = &bind->reserved[i];
         if (own->node_id != 0 && pdcp_identity_equal(&own->identity, identity) &&
-            is_free(bind, bus, now_ms, own->node_id, identity)) {
+            is_free(bus, own->node_id, identity)) {
             return own->node_id;
         }
     }
-    return pick_id(bind, bus, now_ms, identity);
+    return pick_id(bus, identity);
 }
 
 /* [PDCP 3.2.1]: the answer goes to the id that was asked for. */
@@ -184,91 +181,86 @@ static void answer(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t ask
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, asked, &msg);
 }
 
-static pdcp_bind_result_t refuse(pdcp_bus_t *bus, uint32_t now_ms, const pdcp_identity_t *identity,
-                                 uint8_t asked)
+static pdcp_bind_result_t refuse(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked)
 {
     pdcp_bus_count(bus, PDCP_STAT_BIND_REFUSED);
     answer(bus, identity, asked, PDCP_NODE_REFUSED);
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_REFUSED, PDCP_NONE, PDCP_NONE, PDCP_OK);
+    pdcp_bus_tell_node(bus, PDCP_EVENT_REFUSED, PDCP_NONE);
     return PDCP_BIND_REFUSED;
 }
 
-static pdcp_bind_result_t grant(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms,
-                                const pdcp_identity_t *identity, uint8_t asked)
+static pdcp_bind_result_t grant(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked)
 {
-    release_reserved(bind, now_ms, identity);
+    release_reserved(bus, identity);
     pdcp_bus_count(bus, PDCP_STAT_BIND_GRANTED);
     answer(bus, identity, asked, asked);
-    if (remember(bind, identity, asked)) {
-        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_IDENTITIES, PDCP_NONE, PDCP_NONE, PDCP_OK);
+    if (remember(&bus->bind, identity, asked)) {
+        pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
     }
     return PDCP_BIND_GRANTED;
 }
 
-static pdcp_bind_result_t suggest(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms,
-                                  const pdcp_identity_t *identity, uint8_t asked, uint8_t id)
+static pdcp_bind_result_t suggest(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked, uint8_t id)
 {
-    reserve(bind, now_ms, identity, id);
+    reserve(bus, identity, id);
     pdcp_bus_count(bus, PDCP_STAT_BIND_SUGGESTED);
     answer(bus, identity, asked, id);
     return PDCP_BIND_SUGGESTED;
 }
 
 /* A device whose place is kept gets its old id and no other. */
-static pdcp_bind_result_t take_back(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node,
-                                    uint8_t asked)
+static pdcp_bind_result_t take_back(pdcp_bus_t *bus, uint8_t node, uint8_t asked)
 {
     const pdcp_node_t *back = &bus->nodes.nodes[node];
     if (asked != back->node_id) {
-        return suggest(bind, bus, now_ms, &back->identity, asked, back->node_id);
+        return suggest(bus, &back->identity, asked, back->node_id);
     }
-    return grant(bind, bus, now_ms, &back->identity, asked);
+    return grant(bus, &back->identity, asked);
 }
 
-pdcp_bind_result_t pdcp_bind_on_request(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms,
-                                        const pdcp_identity_t *identity, uint8_t asked, uint8_t *node)
+pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
+                                        uint8_t *node)
 {
     *node = pdcp_nodes_find(&bus->nodes, identity);
     if (*node != PDCP_NONE) {
         pdcp_node_t *known = &bus->nodes.nodes[*node];
         if (known->state == PDCP_NODE_LOST) {
-            return take_back(bind, bus, now_ms, *node, asked);
+            return take_back(bus, *node, asked);
         }
         known->asked_again = true;
         known->asked_id = asked;
         return PDCP_BIND_CHECK;
     }
-    const uint8_t id = choose_id(bind, bus, now_ms, identity, asked);
+    const uint8_t id = choose_id(bus, identity, asked);
     if (id == 0 || !pdcp_nodes_has_place(&bus->nodes)) {
-        return refuse(bus, now_ms, identity, asked);
+        return refuse(bus, identity, asked);
     }
     if (id != asked) {
-        return suggest(bind, bus, now_ms, identity, asked, id);
+        return suggest(bus, identity, asked, id);
     }
     *node = pdcp_nodes_add(&bus->nodes, identity, asked);
-    return grant(bind, bus, now_ms, identity, asked);
+    return grant(bus, identity, asked);
 }
 
-pdcp_bind_result_t pdcp_bind_after_check(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node,
-                                         bool answered)
+pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t node, bool answered)
 {
     pdcp_node_t *known = &bus->nodes.nodes[node];
     known->asked_again = false;
     if (!answered) {
-        return take_back(bind, bus, now_ms, node, known->asked_id);
+        return take_back(bus, node, known->asked_id);
     }
     pdcp_bus_count(bus, PDCP_STAT_BIND_DUPLICATE);
     answer(bus, &known->identity, known->asked_id, PDCP_NODE_REFUSED);
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_DUPLICATE, node, PDCP_NONE, PDCP_OK);
+    pdcp_bus_tell_node(bus, PDCP_EVENT_DUPLICATE, node);
     return PDCP_BIND_REFUSED;
 }
 
-uint8_t pdcp_bind_output_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms)
+uint8_t pdcp_bind_output_id(const pdcp_bus_t *bus)
 {
     uint8_t remembered = 0;
     for (uint8_t id = PDCP_NODE_MAX; id >= PDCP_NODE_MIN; id--) {
-        if (is_free(bind, bus, now_ms, id, NULL)) {
-            if (!is_remembered(bind, id)) {
+        if (is_free(bus, id, NULL)) {
+            if (!is_remembered(&bus->bind, id)) {
                 return id;
             }
             remembered = id;

@@ -9,7 +9,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_bus.h"
+#include "pdcp_limits.h"
+#include "pdcp_spec.h"
+
+struct pdcp_bus;
 
 typedef struct {
     pdcp_identity_t identity;
@@ -22,9 +25,10 @@ typedef struct {
     uint32_t until_ms;
 } pdcp_reserved_t;
 
+/* All 0: nothing is remembered, nothing reserved. */
 typedef struct {
-    pdcp_remembered_t remembered[PDCP_IDENTITIES_MAX];
     uint8_t remembered_count;
+    pdcp_remembered_t remembered[PDCP_IDENTITIES_MAX];
     pdcp_reserved_t reserved[PDCP_RESERVED_MAX];
 } pdcp_bind_t;
 
@@ -37,28 +41,25 @@ typedef enum {
                             pdcp_bind_after_check */
 } pdcp_bind_result_t;
 
-void pdcp_bind_init(pdcp_bind_t *bind);
-
 /* Adds an identity behind those that are there, as they come from non-volatile memory, most recently used
  * first. Entries with an invalid or already remembered id, a repeated identity, or beyond the room are left
  * out: false. */
 bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry);
 
 /* Frees reservations that are over; to be called every few days at least. */
-void pdcp_bind_on_time(pdcp_bind_t *bind, uint32_t now_ms);
+void pdcp_bind_on_time(struct pdcp_bus *bus);
 
 /* A bind request with node id asked. Answers it, unless the result is PDCP_BIND_CHECK. */
-pdcp_bind_result_t pdcp_bind_on_request(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms,
-                                        const pdcp_identity_t *identity, uint8_t asked, uint8_t *node);
+pdcp_bind_result_t pdcp_bind_on_request(struct pdcp_bus *bus, const pdcp_identity_t *identity, uint8_t asked,
+                                        uint8_t *node);
 
 /* The check of a bound device is over. It answered: the asking device is another one, refuse it with id 0. It
  * did not: it was reset and is granted its id again (or suggested it). Answers the request that
  * pdcp_bind_on_request left open. */
-pdcp_bind_result_t pdcp_bind_after_check(pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node,
-                                         bool answered);
+pdcp_bind_result_t pdcp_bind_after_check(struct pdcp_bus *bus, uint8_t node, bool answered);
 
 /* A node id for an output channel: free, not reserved, and while there is one, not remembered for a device.
  * Highest first, since devices tend to ask for low ones. 0: none is left. */
-uint8_t pdcp_bind_output_id(const pdcp_bind_t *bind, const pdcp_bus_t *bus, uint32_t now_ms);
+uint8_t pdcp_bind_output_id(const struct pdcp_bus *bus);
 
 #endif

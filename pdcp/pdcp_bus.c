@@ -1,5 +1,15 @@
 #include "pdcp_bus.h"
 
+pdcp_node_t *pdcp_bus_node(pdcp_bus_t *bus, uint8_t node)
+{
+    return &bus->nodes.nodes[node];
+}
+
+void pdcp_bus_wake(pdcp_bus_t *bus, uint8_t timer, uint16_t in_ms)
+{
+    pdcp_timers_set(&bus->timers, timer, bus->now_ms + in_ms);
+}
+
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame)
 {
     const pdcp_txq_put_t put = pdcp_txq_put(&bus->txq, frame);
@@ -16,14 +26,19 @@ bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdc
     return pdcp_bus_send_frame(bus, &frame);
 }
 
-void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
+void pdcp_bus_tell(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
                    pdcp_status_t status)
 {
     const pdcp_event_t event = {.kind = kind, .node = node, .channel = channel, .status = (int8_t)status};
-    bus->on_event(bus->event_ctx, now_ms, &event);
+    bus->on_event(bus->event_ctx, bus->now_ms, &event);
 }
 
 void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
 {
     bus->stats[stat]++;
+}
+
+void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node)
+{
+    pdcp_bus_tell(bus, kind, node, PDCP_NONE, PDCP_OK);
 }

@@ -4,7 +4,9 @@
 #ifndef PDCP_BUS_H
 #define PDCP_BUS_H
 
+#include "pdcp_bind.h"
 #include "pdcp_codec.h"
+#include "pdcp_link.h"
 #include "pdcp_nodes.h"
 #include "pdcp_stats.h"
 #include "pdcp_timer.h"
@@ -40,14 +42,25 @@ typedef struct {
  * the arbitrator but to read its tables; the event is valid during the call. */
 typedef void (*pdcp_event_fn)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
 
+/* Small state stands first here and in the structs around it: on the smallest part, a field that lies farther
+ * than 511 bytes from the beginning costs twice the instructions. */
 typedef struct pdcp_bus {
+    uint32_t now_ms; /* of the call that the arbitrator is in: its functions note it first of all */
+    pdcp_event_fn on_event;
+    void *event_ctx;
+    pdcp_link_t link;
     pdcp_nodes_t nodes;
     pdcp_timers_t timers;
     pdcp_txq_t txq;
     uint32_t stats[PDCP_STAT_COUNT];
-    pdcp_event_fn on_event;
-    void *event_ctx;
+    pdcp_bind_t bind;
 } pdcp_bus_t;
+
+/* The device at this place, which must be one. */
+pdcp_node_t *pdcp_bus_node(pdcp_bus_t *bus, uint8_t node);
+
+/* Sets timer so that it fires in_ms from now. */
+void pdcp_bus_wake(pdcp_bus_t *bus, uint8_t timer, uint16_t in_ms);
 
 void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 
@@ -56,7 +69,10 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
 
-void pdcp_bus_tell(pdcp_bus_t *bus, uint32_t now_ms, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
+void pdcp_bus_tell(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
                    pdcp_status_t status);
+
+/* The same of a device (PDCP_NONE: of none), when there is no more to say. */
+void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node);
 
 #endif

@@ -155,3 +155,8 @@ void pdcp_put_u16(uint8_t *bytes, uint16_t word)
     bytes[0] = (uint8_t)(word & 0xFFu);
     bytes[1] = (uint8_t)(word >> 8);
 }
+
+bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b)
+{
+    return a->vid == b->vid && a->pid == b->pid && a->sn == b->sn;
+}

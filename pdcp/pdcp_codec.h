@@ -67,9 +67,6 @@ uint8_t pdcp_value_u8(const uint8_t *value, uint8_t len, uint8_t at);
 uint16_t pdcp_value_u16(const uint8_t *value, uint8_t len, uint8_t at);
 void pdcp_put_u16(uint8_t *bytes, uint16_t word);
 
-static inline bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b)
-{
-    return a->vid == b->vid && a->pid == b->pid && a->sn == b->sn;
-}
+bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b);
 
 #endif

@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bus.h"
+
 /* Steps of a job in the order of making a link; undoing and removing run through them backwards. */
 typedef enum {
     STEP_READ_VID_PID, /* Update Data Channel: what source the device names */
@@ -17,13 +19,13 @@ typedef enum {
     STEP_END
 } step_t;
 
-void pdcp_link_init(pdcp_link_t *link)
+void pdcp_link_init(pdcp_bus_t *bus)
 {
-    const bool planned = link->planned;
-    memset(link, 0, sizeof *link);
-    link->planned = planned;
-    link->wish_input = PDCP_NONE;
-    link->at = PDCP_NONE;
+    const bool planned = bus->link.planned;
+    memset(&bus->link, 0, sizeof bus->link);
+    bus->link.planned = planned;
+    bus->link.wish_input = PDCP_NONE;
+    bus->link.at = PDCP_NONE;
 }
 
 static pdcp_channel_t *channel_of(pdcp_bus_t *bus, uint8_t channel)
@@ -44,12 +46,12 @@ static bool is_unconnected(const pdcp_channel_t *input)
 
 /* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing
  * to be made. */
-static void put_todo(pdcp_link_t *link, pdcp_channel_t *channel, pdcp_todo_t todo)
+static void put_todo(pdcp_bus_t *bus, pdcp_channel_t *channel, pdcp_todo_t todo)
 {
     if (channel->todo != PDCP_TODO_REMOVE) {
         channel->todo = (uint8_t)todo;
     }
-    link->due = true;
+    bus->link.due = true;
 }
 
 /* The output that an input names as its source, if its device is set up. */
@@ -78,28 +80,33 @@ static bool output_is_needed(const pdcp_bus_t *bus, uint8_t output)
 }
 
 /* An output that no active link needs any more is to be disabled. */
-static void release_output(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t output)
+static void release_output(pdcp_bus_t *bus, uint8_t output)
 {
     if (is_ready(bus, output) && bus->nodes.channels[output].transfer == PDCP_OUTPUT &&
         bus->nodes.channels[output].enabled && !output_is_needed(bus, output)) {
-        put_todo(link, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
+        put_todo(bus, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
     }
 }
 
-bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input)
+bool pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
 {
-    if (link->wish_input != PDCP_NONE) {
+    if (bus->link.wish_input != PDCP_NONE) {
         return false;
     }
-    link->wish_input = input;
-    link->wish_output = output;
-    link->due = true;
+    bus->link.wish_input = input;
+    bus->link.wish_output = output;
+    bus->link.due = true;
     return true;
 }
 
-void pdcp_link_remove(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t input)
+bool pdcp_link_wish_waits(const pdcp_bus_t *bus)
 {
-    put_todo(link, &bus->nodes.channels[input], PDCP_TODO_REMOVE);
+    return bus->link.wish_input != PDCP_NONE || (bus->link.active && bus->link.for_host);
+}
+
+void pdcp_link_remove(pdcp_bus_t *bus, uint8_t input)
+{
+    put_todo(bus, &bus->nodes.channels[input], PDCP_TODO_REMOVE);
 }
 
 static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, uint8_t result)
@@ -108,13 +115,13 @@ static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, uint8_t 
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, bus->nodes.nodes[node].node_id, &msg);
 }
 
-void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8_t index)
+void pdcp_link_on_update(pdcp_bus_t *bus, uint8_t node, uint8_t index)
 {
     const uint8_t number = pdcp_nodes_channel(&bus->nodes, node, index);
     const uint8_t state = bus->nodes.nodes[node].state;
     if (state == PDCP_NODE_SETUP) {
         if (number != PDCP_NONE) {
-            put_todo(link, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
+            put_todo(bus, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
         }
         return; /* without a channel yet: the device asks again */
     }
@@ -123,12 +130,12 @@ void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8
         answer_update(bus, node, index, PDCP_FAILURE);
         return;
     }
-    put_todo(link, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
+    put_todo(bus, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
 }
 
-void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
+void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
 {
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && !link->planned; i++) {
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && !bus->link.planned; i++) {
         pdcp_channel_t *input = &bus->nodes.channels[i];
         if (input->node == PDCP_NONE || input->link != PDCP_LINK_INACTIVE) {
             continue;
@@ -137,76 +144,76 @@ void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
         const bool concerned = node == PDCP_NONE || input->node == node ||
                                (input->feed != PDCP_NONE && bus->nodes.channels[input->feed].node == node);
         if (concerned && input->feed != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
-            put_todo(link, input, PDCP_TODO_CONNECT);
+            put_todo(bus, input, PDCP_TODO_CONNECT);
         }
     }
-    link->due = true; /* an Update Data Channel may have waited for the end of the setup */
+    bus->link.due = true; /* an Update Data Channel may have waited for the end of the setup */
 }
 
 /* The input's own end of a link is gone, or its source is. */
-static void deactivate(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t number, bool input_gone)
+static void deactivate(pdcp_bus_t *bus, uint8_t number, bool input_gone)
 {
     pdcp_channel_t *input = &bus->nodes.channels[number];
     input->link = PDCP_LINK_INACTIVE;
     if (input_gone) {
-        release_output(link, bus, input->feed);
+        release_output(bus, input->feed);
     } else {
-        put_todo(link, input, PDCP_TODO_SILENCE);
+        put_todo(bus, input, PDCP_TODO_SILENCE);
     }
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
+    pdcp_bus_tell(bus, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
 }
 
-void pdcp_link_rest(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t input)
+void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
 {
-    deactivate(link, bus, now_ms, input, false);
-    release_output(link, bus, bus->nodes.channels[input].feed);
+    deactivate(bus, input, false);
+    release_output(bus, bus->nodes.channels[input].feed);
 }
 
-static void give_back_old(const pdcp_link_t *link, pdcp_channel_t *input)
+static void give_back_old(const pdcp_bus_t *bus, pdcp_channel_t *input)
 {
-    input->source = link->old_source;
-    input->source_index = link->old_index;
-    input->source_type = link->old_type;
-    input->source_profile = link->old_profile;
-    input->link = link->old_link != PDCP_LINK_NONE ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE; /* D-BUS-10 */
+    input->source = bus->link.old_source;
+    input->source_index = bus->link.old_index;
+    input->source_type = bus->link.old_type;
+    input->source_profile = bus->link.old_profile;
+    input->link = bus->link.old_link != PDCP_LINK_NONE ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE; /* D-BUS-10 */
     input->feed = PDCP_NONE;
 }
 
 /* The job under way goes on without the channels of a device that is gone. */
-static void leave_job(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node)
+static void leave_job(pdcp_bus_t *bus, uint8_t node)
 {
-    if (!link->active) {
+    if (!bus->link.active) {
         return;
     }
-    if (link->input != PDCP_NONE && bus->nodes.channels[link->input].node == node) {
-        if (!link->undoing) {
-            give_back_old(link, &bus->nodes.channels[link->input]);
+    if (bus->link.input != PDCP_NONE && bus->nodes.channels[bus->link.input].node == node) {
+        if (!bus->link.undoing) {
+            give_back_old(bus, &bus->nodes.channels[bus->link.input]);
         }
-        link->input = PDCP_NONE;
+        bus->link.input = PDCP_NONE;
     }
-    if (link->output != PDCP_NONE && bus->nodes.channels[link->output].node == node) {
-        link->output = PDCP_NONE;
+    if (bus->link.output != PDCP_NONE && bus->nodes.channels[bus->link.output].node == node) {
+        bus->link.output = PDCP_NONE;
     }
-    if (link->at == node) {
-        link->at = PDCP_NONE;
-        link->waiting = true;
+    if (bus->link.at == node) {
+        bus->link.at = PDCP_NONE;
+        bus->link.waiting = true;
     }
 }
 
-static void wish_ends(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+static void wish_ends(pdcp_bus_t *bus, pdcp_status_t status)
 {
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->wish_input, status);
-    link->wish_input = PDCP_NONE;
+    pdcp_bus_tell(bus, PDCP_EVENT_WISH, PDCP_NONE, bus->link.wish_input, status);
+    bus->link.wish_input = PDCP_NONE;
 }
 
-void pdcp_link_forget_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+void pdcp_link_forget_wish(pdcp_bus_t *bus, pdcp_status_t status)
 {
-    if (link->wish_input != PDCP_NONE) {
-        wish_ends(link, bus, now_ms, status);
+    if (bus->link.wish_input != PDCP_NONE) {
+        wish_ends(bus, status);
     }
 }
 
-void pdcp_link_on_lost(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &bus->nodes.channels[i];
@@ -220,13 +227,13 @@ void pdcp_link_on_lost(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint
             channel->todo = PDCP_TODO_NONE;
         }
         if (channel->link == PDCP_LINK_ACTIVE && (own || fed)) {
-            deactivate(link, bus, now_ms, i, own);
+            deactivate(bus, i, own);
         }
     }
-    leave_job(link, bus, node);
-    if (link->wish_input != PDCP_NONE && (bus->nodes.channels[link->wish_input].node == node ||
-                                          bus->nodes.channels[link->wish_output].node == node)) {
-        wish_ends(link, bus, now_ms, PDCP_ERR_NO_ANSWER); /* its channels may be others' before its turn */
+    leave_job(bus, node);
+    if (bus->link.wish_input != PDCP_NONE && (bus->nodes.channels[bus->link.wish_input].node == node ||
+                                              bus->nodes.channels[bus->link.wish_output].node == node)) {
+        wish_ends(bus, PDCP_ERR_NO_ANSWER); /* its channels may be others' before its turn */
     }
 }
 
@@ -237,15 +244,15 @@ static bool is_input_step(uint8_t step)
 
 /* What a step writes: the parameter, and its value in bytes[]. Returns the length; 0: nothing is to be
  * written. */
-static uint8_t value_of(const pdcp_link_t *link, pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
+static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
 {
-    const pdcp_channel_t *input = channel_of(bus, link->input);
-    const pdcp_channel_t *output = channel_of(bus, link->output);
+    const pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    const pdcp_channel_t *output = channel_of(bus, bus->link.output);
     memset(bytes, 0, PDCP_VALUE_MAX);
-    switch ((step_t)link->step) {
+    switch ((step_t)bus->link.step) {
     case STEP_INPUT_OFF:
         *param = PDCP_CH_ENABLED;
-        return input->enabled && !link->undoing ? 1 : 0;
+        return input->enabled && !bus->link.undoing ? 1 : 0;
     case STEP_VID_PID:
         *param = PDCP_IN_SOURCE_VID_PID;
         pdcp_put_u16(&bytes[0], input->source.vid);
@@ -263,7 +270,7 @@ static uint8_t value_of(const pdcp_link_t *link, pdcp_bus_t *bus, uint8_t *param
         return 4;
     case STEP_NODES:
         *param = PDCP_IN_SOURCE_NODES;
-        if (!link->undoing) {
+        if (!bus->link.undoing) {
             bytes[0] = bus->nodes.nodes[output->node].node_id;
             bytes[1] = output->node_id;
         }
@@ -271,378 +278,377 @@ static uint8_t value_of(const pdcp_link_t *link, pdcp_bus_t *bus, uint8_t *param
     case STEP_INPUT_ON:
     case STEP_OUTPUT_ON:
         *param = PDCP_CH_ENABLED;
-        bytes[0] = link->undoing ? 0 : 1;
-        return link->step == STEP_OUTPUT_ON && link->output_was_on ? 0 : 1;
+        bytes[0] = bus->link.undoing ? 0 : 1;
+        return bus->link.step == STEP_OUTPUT_ON && bus->link.output_was_on ? 0 : 1;
     default:
         return 0;
     }
 }
 
-static void take_old(pdcp_link_t *link, const pdcp_channel_t *input)
+static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
 {
-    link->old_source = input->source;
-    link->old_index = input->source_index;
-    link->old_type = input->source_type;
-    link->old_profile = input->source_profile;
-    link->old_link = input->link;
-    link->old_feed = input->feed;
+    bus->link.old_source = input->source;
+    bus->link.old_index = input->source_index;
+    bus->link.old_type = input->source_type;
+    bus->link.old_profile = input->source_profile;
+    bus->link.old_link = input->link;
+    bus->link.old_feed = input->feed;
 }
 
-static void name_source(pdcp_link_t *link, pdcp_bus_t *bus)
+static void name_source(pdcp_bus_t *bus)
 {
-    pdcp_channel_t *input = channel_of(bus, link->input);
-    const pdcp_channel_t *output = channel_of(bus, link->output);
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    const pdcp_channel_t *output = channel_of(bus, bus->link.output);
     input->source = bus->nodes.nodes[output->node].identity;
     input->source_index = output->index;
     input->source_type = output->type;
     input->source_profile = output->profile;
-    input->feed = link->output;
+    input->feed = bus->link.output;
     input->link = PDCP_LINK_INACTIVE;
-    link->output_was_on = output_is_needed(bus, link->output); /* enabled alone means: may be */
+    bus->link.output_was_on = output_is_needed(bus, bus->link.output); /* enabled alone means: may be */
 }
 
-static void begin(pdcp_link_t *link, pdcp_todo_t kind, uint8_t input, uint8_t output, step_t step)
+static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t output, step_t step)
 {
-    link->active = true;
-    link->waiting = true;
-    link->at = PDCP_NONE;
-    link->kind = (uint8_t)kind;
-    link->input = input;
-    link->output = output;
-    link->step = (uint8_t)step;
-    link->undoing = kind != PDCP_TODO_CONNECT && kind != PDCP_TODO_UPDATE;
-    link->once = false;
-    link->for_host = false;
-    link->again = false;
-    link->output_was_on = false;
-    link->status = PDCP_OK;
+    bus->link.active = true;
+    bus->link.waiting = true;
+    bus->link.at = PDCP_NONE;
+    bus->link.kind = (uint8_t)kind;
+    bus->link.input = input;
+    bus->link.output = output;
+    bus->link.step = (uint8_t)step;
+    bus->link.undoing = kind != PDCP_TODO_CONNECT && kind != PDCP_TODO_UPDATE;
+    bus->link.once = false;
+    bus->link.for_host = false;
+    bus->link.again = false;
+    bus->link.output_was_on = false;
+    bus->link.status = PDCP_OK;
 }
 
-static void tell_link(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static void tell_link(pdcp_bus_t *bus)
 {
-    if (link->input != PDCP_NONE) {
-        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_LINK, bus->nodes.channels[link->input].node, link->input,
-                      (pdcp_status_t)link->status);
+    if (bus->link.input != PDCP_NONE) {
+        pdcp_bus_tell(bus, PDCP_EVENT_LINK, bus->nodes.channels[bus->link.input].node, bus->link.input,
+                      (pdcp_status_t)bus->link.status);
     }
-    if (link->for_host) {
-        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->input, (pdcp_status_t)link->status);
+    if (bus->link.for_host) {
+        pdcp_bus_tell(bus, PDCP_EVENT_WISH, PDCP_NONE, bus->link.input, (pdcp_status_t)bus->link.status);
     }
 }
 
 /* What must not go on hearing or sending is told so until it answers or its device is lost. */
-static void silence_again(pdcp_link_t *link, pdcp_channel_t *channel)
+static void silence_again(pdcp_bus_t *bus, pdcp_channel_t *channel)
 {
     if (channel != NULL && channel->enabled && channel->todo == PDCP_TODO_NONE) {
-        put_todo(link, channel, PDCP_TODO_AGAIN);
+        put_todo(bus, channel, PDCP_TODO_AGAIN);
     }
 }
 
 /* The link of an input could not be made: it is what it was before, or remembered as inactive; one that
  * worked is made anew. */
-static void settle_failed(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static void settle_failed(pdcp_bus_t *bus)
 {
-    pdcp_channel_t *input = channel_of(bus, link->input);
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
     pdcp_bus_count(bus, PDCP_STAT_LINK_FAILED);
-    if (link->output_was_on) {
-        release_output(link, bus, link->output); /* whose other listeners may be gone meanwhile */
+    if (bus->link.output_was_on) {
+        release_output(bus, bus->link.output); /* whose other listeners may be gone meanwhile */
     } else {
-        silence_again(link, channel_of(bus, link->output));
+        silence_again(bus, channel_of(bus, bus->link.output));
     }
-    if (link->old_feed != link->output) {
-        release_output(link, bus, link->old_feed);
+    if (bus->link.old_feed != bus->link.output) {
+        release_output(bus, bus->link.old_feed);
     }
     if (input == NULL) {
         return;
     }
     input->feed = input->link != PDCP_LINK_NONE ? find_source(bus, input) : PDCP_NONE;
-    if (link->old_link == PDCP_LINK_ACTIVE) {
-        put_todo(link, input, PDCP_TODO_CONNECT);
-    } else if (input->link == PDCP_LINK_INACTIVE && link->status == PDCP_ERR_NO_ANSWER && !link->planned) {
-        pdcp_timers_set(&bus->timers, PDCP_TIMER_LINK, now_ms + PDCP_LINK_PAUSE_MS); /* D-BUS-26 */
+    if (bus->link.old_link == PDCP_LINK_ACTIVE) {
+        put_todo(bus, input, PDCP_TODO_CONNECT);
+    } else if (input->link == PDCP_LINK_INACTIVE && bus->link.status == PDCP_ERR_NO_ANSWER &&
+               !bus->link.planned) {
+        pdcp_bus_wake(bus, PDCP_TIMER_LINK, PDCP_LINK_PAUSE_MS); /* D-BUS-26 */
     }
-    silence_again(link, input);
+    silence_again(bus, input);
 }
 
-static void settle_made(pdcp_link_t *link, pdcp_bus_t *bus)
+static void settle_made(pdcp_bus_t *bus)
 {
-    bus->nodes.channels[link->input].link = PDCP_LINK_ACTIVE;
-    if (link->old_feed != link->output) {
-        release_output(link, bus, link->old_feed);
+    bus->nodes.channels[bus->link.input].link = PDCP_LINK_ACTIVE;
+    if (bus->link.old_feed != bus->link.output) {
+        release_output(bus, bus->link.old_feed);
     }
 }
 
-static void settle_silenced(pdcp_link_t *link, pdcp_bus_t *bus)
+static void settle_silenced(pdcp_bus_t *bus)
 {
-    pdcp_channel_t *input = channel_of(bus, link->input);
-    if (link->status == PDCP_ERR_NO_ANSWER) {
-        silence_again(link, input);
-        silence_again(link, channel_of(bus, link->output));
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    if (bus->link.status == PDCP_ERR_NO_ANSWER) {
+        silence_again(bus, input);
+        silence_again(bus, channel_of(bus, bus->link.output));
     }
-    if (input != NULL && link->kind == PDCP_TODO_REMOVE) {
+    if (input != NULL && bus->link.kind == PDCP_TODO_REMOVE) {
         input->link = PDCP_LINK_NONE;
         input->feed = PDCP_NONE;
-        release_output(link, bus, link->old_feed);
+        release_output(bus, bus->link.old_feed);
     }
 }
 
-static void end(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static void end(pdcp_bus_t *bus)
 {
-    const pdcp_channel_t *input = channel_of(bus, link->input);
-    const bool making = link->kind == PDCP_TODO_CONNECT || link->kind == PDCP_TODO_UPDATE;
-    link->active = false;
-    link->due = true;
+    const pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    const bool making = bus->link.kind == PDCP_TODO_CONNECT || bus->link.kind == PDCP_TODO_UPDATE;
+    bus->link.active = false;
+    bus->link.due = true;
     if (!making) {
-        settle_silenced(link, bus);
-    } else if (link->status == PDCP_OK) {
-        settle_made(link, bus);
+        settle_silenced(bus);
+    } else if (bus->link.status == PDCP_OK) {
+        settle_made(bus);
     } else {
-        settle_failed(link, bus, now_ms);
+        settle_failed(bus);
     }
-    const bool unread = link->status == PDCP_ERR_NO_ANSWER && link->step <= STEP_READ_SERIAL;
-    if (link->kind == PDCP_TODO_UPDATE && input != NULL && !unread) { /* else the device asks again */
-        answer_update(bus, input->node, input->index, link->status == PDCP_OK ? PDCP_SUCCESS : PDCP_FAILURE);
+    const bool unread = bus->link.status == PDCP_ERR_NO_ANSWER && bus->link.step <= STEP_READ_SERIAL;
+    if (bus->link.kind == PDCP_TODO_UPDATE && input != NULL && !unread) { /* else the device asks again */
+        answer_update(bus, input->node, input->index,
+                      bus->link.status == PDCP_OK ? PDCP_SUCCESS : PDCP_FAILURE);
     }
-    tell_link(link, bus, now_ms);
+    tell_link(bus);
 }
 
 /* Nothing more is to be written forwards. Once the source was written, steps run backwards, the failed one
  * first: whether it was carried out nobody knows. */
-static void give_up(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+static void give_up(pdcp_bus_t *bus, pdcp_status_t status)
 {
-    pdcp_channel_t *input = channel_of(bus, link->input);
-    link->status = (int8_t)status;
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    bus->link.status = (int8_t)status;
     if (input != NULL) {
-        give_back_old(link, input);
+        give_back_old(bus, input);
     }
-    if (link->step < STEP_VID_PID) {
-        end(link, bus, now_ms);
+    if (bus->link.step < STEP_VID_PID) {
+        end(bus);
         return;
     }
-    link->undoing = true;
-    link->last_step = STEP_VID_PID;
+    bus->link.undoing = true;
+    bus->link.last_step = STEP_VID_PID;
 }
 
 /* Update Data Channel, once 5 and 6 are read: is the source that they name on the bus? False: the job is
  * over. */
-static bool resolve(pdcp_link_t *link, pdcp_bus_t *bus)
+static bool resolve(pdcp_bus_t *bus)
 {
-    pdcp_channel_t *input = channel_of(bus, link->input);
-    link->output = find_source(bus, input);
-    if (input->link == PDCP_LINK_ACTIVE && link->output == input->feed) {
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    bus->link.output = find_source(bus, input);
+    if (input->link == PDCP_LINK_ACTIVE && bus->link.output == input->feed) {
         return false;
     }
     input->link = is_unconnected(input) ? PDCP_LINK_NONE : PDCP_LINK_INACTIVE;
-    take_old(link, input);
-    if (link->output == PDCP_NONE) {
+    take_old(bus, input);
+    if (bus->link.output == PDCP_NONE) {
         input->feed = PDCP_NONE;
-        release_output(link, bus, link->old_feed);
+        release_output(bus, bus->link.old_feed);
         if (input->enabled) {
-            put_todo(link, input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
+            put_todo(bus, input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
         }
-        link->status = PDCP_ERR_UNKNOWN;
+        bus->link.status = PDCP_ERR_UNKNOWN;
         return false;
     }
-    name_source(link, bus);
+    name_source(bus);
     return true;
 }
 
 /* Moves to the step that comes next in the job's direction. False: there is none. */
-static bool advance(pdcp_link_t *link)
+static bool advance(pdcp_bus_t *bus)
 {
-    if (link->undoing) {
-        if (link->step <= link->last_step) {
+    if (bus->link.undoing) {
+        if (bus->link.step <= bus->link.last_step) {
             return false;
         }
-        link->step--;
+        bus->link.step--;
         return true;
     }
-    link->step++;
-    return link->step != STEP_END;
+    bus->link.step++;
+    return bus->link.step != STEP_END;
 }
 
 /* Can the current step be carried out on its device? */
-static bool step_possible(const pdcp_link_t *link, const pdcp_bus_t *bus)
+static bool step_possible(const pdcp_bus_t *bus)
 {
-    const bool needs_output = link->step == STEP_OUTPUT_ON || (link->step == STEP_NODES && !link->undoing);
-    if (!link->undoing && !is_ready(bus, link->input)) {
+    const bool needs_output =
+        bus->link.step == STEP_OUTPUT_ON || (bus->link.step == STEP_NODES && !bus->link.undoing);
+    if (!bus->link.undoing && !is_ready(bus, bus->link.input)) {
         return false; /* there is no link to be made any more */
     }
-    if (needs_output && !is_ready(bus, link->output)) {
+    if (needs_output && !is_ready(bus, bus->link.output)) {
         return false;
     }
-    return !is_input_step(link->step) || is_ready(bus, link->input);
+    return !is_input_step(bus->link.step) || is_ready(bus, bus->link.input);
 }
 
 /* Sends the request of the current step. False: there is nothing to write in it. */
-static bool send_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static bool send_step(pdcp_bus_t *bus)
 {
-    const uint8_t number = is_input_step(link->step) ? link->input : link->output;
+    const uint8_t number = is_input_step(bus->link.step) ? bus->link.input : bus->link.output;
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (link->step <= STEP_READ_SERIAL) {
-        const uint8_t read = link->step == STEP_READ_VID_PID ? PDCP_IN_SOURCE_VID_PID : PDCP_IN_SOURCE_SERIAL;
-        pdcp_request_get(bus, now_ms, channel->node, PDCP_CLIENT_LINK, channel->index, read, PDCP_VALUE_MAX);
+    if (bus->link.step <= STEP_READ_SERIAL) {
+        const uint8_t read =
+            bus->link.step == STEP_READ_VID_PID ? PDCP_IN_SOURCE_VID_PID : PDCP_IN_SOURCE_SERIAL;
+        pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, read, PDCP_VALUE_MAX);
         return true;
     }
     uint8_t param = 0;
     uint8_t bytes[PDCP_VALUE_MAX];
-    const uint8_t len = value_of(link, bus, &param, bytes);
+    const uint8_t len = value_of(bus, &param, bytes);
     if (len == 0) {
         return false;
     }
     if (param == PDCP_CH_ENABLED && bytes[0] != 0) {
         channel->enabled = true; /* from now on it may be */
     }
-    pdcp_request_set(bus, now_ms, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
-    if (link->once) {
+    pdcp_request_set(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
+    if (bus->link.once) {
         pdcp_request_try_once(bus, channel->node);
     }
     return true;
 }
 
 /* Carries the job on until it waits for an answer, waits for a device's place, or is over. */
-static void run(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static void run(pdcp_bus_t *bus)
 {
-    while (link->active) {
-        link->waiting = false;
-        if (!step_possible(link, bus)) {
-            if (!link->undoing) {
-                give_up(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
-            } else if (!advance(link)) {
-                end(link, bus, now_ms);
+    while (bus->link.active) {
+        bus->link.waiting = false;
+        if (!step_possible(bus)) {
+            if (!bus->link.undoing) {
+                give_up(bus, PDCP_ERR_NO_ANSWER);
+            } else if (!advance(bus)) {
+                end(bus);
             }
             continue;
         }
-        const uint8_t number = is_input_step(link->step) ? link->input : link->output;
+        const uint8_t number = is_input_step(bus->link.step) ? bus->link.input : bus->link.output;
         if (!pdcp_request_is_idle(bus, bus->nodes.channels[number].node)) {
-            link->waiting = true;
+            bus->link.waiting = true;
             return;
         }
-        if (send_step(link, bus, now_ms)) {
-            link->at = bus->nodes.channels[number].node;
+        if (send_step(bus)) {
+            bus->link.at = bus->nodes.channels[number].node;
             return;
         }
-        if (!advance(link)) {
-            end(link, bus, now_ms);
+        if (!advance(bus)) {
+            end(bus);
         }
     }
 }
 
-static void took_effect(pdcp_link_t *link, pdcp_bus_t *bus, const pdcp_reply_t *reply)
+static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
-    pdcp_channel_t *input = channel_of(bus, link->input);
-    const uint8_t len = (uint8_t)reply->len;
-    switch ((step_t)link->step) {
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    switch ((step_t)bus->link.step) {
     case STEP_READ_VID_PID:
-        input->source.vid = pdcp_value_u16(reply->bytes, len, 0);
-        input->source.pid = pdcp_value_u16(reply->bytes, len, 2);
-        break;
     case STEP_READ_SERIAL:
-        input->source.sn = pdcp_value_u16(reply->bytes, len, 0);
-        input->source_index = pdcp_value_u8(reply->bytes, len, 2);
+        pdcp_nodes_take_source(input, reply->param, reply->bytes, (uint8_t)reply->len);
         break;
     case STEP_INPUT_OFF:
         input->enabled = false;
         break;
     case STEP_INPUT_ON:
-        input->enabled = !link->undoing;
+        input->enabled = !bus->link.undoing;
         break;
     case STEP_OUTPUT_ON:
-        bus->nodes.channels[link->output].enabled = !link->undoing;
+        bus->nodes.channels[bus->link.output].enabled = !bus->link.undoing;
         break;
     default:
         break;
     }
 }
 
-static void go_on(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static void go_on(pdcp_bus_t *bus)
 {
-    if (advance(link)) {
-        run(link, bus, now_ms);
+    if (advance(bus)) {
+        run(bus);
     } else {
-        end(link, bus, now_ms);
+        end(bus);
     }
 }
 
 /* A step was refused or not answered. */
-static void on_failure(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status)
+static void on_failure(pdcp_bus_t *bus, pdcp_status_t status)
 {
-    if (!link->undoing && link->step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
-        go_on(link, bus, now_ms); /* a device without the profile layer (D-BUS-20) */
+    if (!bus->link.undoing && bus->link.step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
+        go_on(bus); /* a device without the profile layer (D-BUS-20) */
         return;
     }
-    if (!link->undoing) {
-        link->once = status == PDCP_ERR_NO_ANSWER;
-        give_up(link, bus, now_ms, status);
-        run(link, bus, now_ms);
+    if (!bus->link.undoing) {
+        bus->link.once = status == PDCP_ERR_NO_ANSWER;
+        give_up(bus, status);
+        run(bus);
         return;
     }
     if (status == PDCP_ERR_NO_ANSWER) {
-        link->status = (int8_t)status;
-        if (is_input_step(link->step)) {
-            link->step = link->last_step; /* the rest is for the same silent device */
+        bus->link.status = (int8_t)status;
+        if (is_input_step(bus->link.step)) {
+            bus->link.step = bus->link.last_step; /* the rest is for the same silent device */
         }
     }
-    go_on(link, bus, now_ms);
+    go_on(bus);
 }
 
-uint8_t pdcp_link_give_up_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+uint8_t pdcp_link_give_up_wish(pdcp_bus_t *bus)
 {
-    const uint8_t at = link->at;
-    pdcp_link_forget_wish(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
-    if (!link->active || !link->for_host) {
+    const uint8_t at = bus->link.at;
+    pdcp_link_forget_wish(bus, PDCP_ERR_NO_ANSWER);
+    if (!bus->link.active || !bus->link.for_host) {
         return PDCP_NONE;
     }
-    link->for_host = false;
-    pdcp_bus_tell(bus, now_ms, PDCP_EVENT_WISH, PDCP_NONE, link->input, PDCP_ERR_NO_ANSWER);
-    if (link->undoing) {
+    bus->link.for_host = false;
+    pdcp_bus_tell(bus, PDCP_EVENT_WISH, PDCP_NONE, bus->link.input, PDCP_ERR_NO_ANSWER);
+    if (bus->link.undoing) {
         return PDCP_NONE;
     }
     if (at != PDCP_NONE) {
         pdcp_request_cancel(bus, at);
-        link->at = PDCP_NONE;
+        bus->link.at = PDCP_NONE;
     }
-    on_failure(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+    on_failure(bus, PDCP_ERR_NO_ANSWER);
     return at;
 }
 
-void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, const pdcp_reply_t *reply)
+void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
-    const bool gone = (is_input_step(link->step) ? link->input : link->output) == PDCP_NONE;
+    const bool gone = (is_input_step(bus->link.step) ? bus->link.input : bus->link.output) == PDCP_NONE;
     if (!reply->done || gone) {
         return;
     }
-    link->at = PDCP_NONE;
+    bus->link.at = PDCP_NONE;
     if (reply->status != PDCP_OK) {
-        on_failure(link, bus, now_ms, (pdcp_status_t)reply->status);
+        on_failure(bus, (pdcp_status_t)reply->status);
         return;
     }
-    took_effect(link, bus, reply);
-    link->once = false;
-    if (!link->undoing && link->input == PDCP_NONE) {
-        give_up(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
-        run(link, bus, now_ms);
+    took_effect(bus, reply);
+    bus->link.once = false;
+    if (!bus->link.undoing && bus->link.input == PDCP_NONE) {
+        give_up(bus, PDCP_ERR_NO_ANSWER);
+        run(bus);
         return;
     }
-    if (link->step == STEP_READ_SERIAL && !resolve(link, bus)) {
-        end(link, bus, now_ms);
+    if (bus->link.step == STEP_READ_SERIAL && !resolve(bus)) {
+        end(bus);
         return;
     }
-    go_on(link, bus, now_ms);
+    go_on(bus);
 }
 
-static void start_silence(pdcp_link_t *link, const pdcp_bus_t *bus, uint8_t number)
+static void start_silence(pdcp_bus_t *bus, uint8_t number)
 {
     if (bus->nodes.channels[number].transfer == PDCP_INPUT) {
-        begin(link, PDCP_TODO_SILENCE, number, PDCP_NONE, STEP_INPUT_ON);
-        link->last_step = STEP_NODES;
+        begin(bus, PDCP_TODO_SILENCE, number, PDCP_NONE, STEP_INPUT_ON);
+        bus->link.last_step = STEP_NODES;
     } else if (!output_is_needed(bus, number)) { /* nor by a link made meanwhile */
-        begin(link, PDCP_TODO_SILENCE, PDCP_NONE, number, STEP_OUTPUT_ON);
-        link->last_step = STEP_OUTPUT_ON;
+        begin(bus, PDCP_TODO_SILENCE, PDCP_NONE, number, STEP_OUTPUT_ON);
+        bus->link.last_step = STEP_OUTPUT_ON;
     }
 }
 
 /* Starts the job that a channel has to do, if it can be done now. */
-static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
+static void start_todo(pdcp_bus_t *bus, uint8_t number)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
     const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
@@ -650,54 +656,54 @@ static void start_todo(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t number)
     switch (todo) {
     case PDCP_TODO_SILENCE:
     case PDCP_TODO_AGAIN:
-        start_silence(link, bus, number);
-        link->again = todo == PDCP_TODO_AGAIN;
+        start_silence(bus, number);
+        bus->link.again = todo == PDCP_TODO_AGAIN;
         break;
     case PDCP_TODO_REMOVE:
-        begin(link, todo, number, PDCP_NONE, STEP_INPUT_ON);
-        link->last_step = STEP_VID_PID;
-        take_old(link, channel);
+        begin(bus, todo, number, PDCP_NONE, STEP_INPUT_ON);
+        bus->link.last_step = STEP_VID_PID;
+        take_old(bus, channel);
         pdcp_nodes_clear_source(channel);
         break;
     case PDCP_TODO_CONNECT:
         channel->feed = find_source(bus, channel);
         if (channel->feed != PDCP_NONE && is_ready(bus, number)) {
-            begin(link, todo, number, channel->feed, STEP_INPUT_OFF);
-            take_old(link, channel);
-            name_source(link, bus);
+            begin(bus, todo, number, channel->feed, STEP_INPUT_OFF);
+            take_old(bus, channel);
+            name_source(bus);
         } else {
-            silence_again(link, channel);
+            silence_again(bus, channel);
         }
         break;
     default: /* PDCP_TODO_UPDATE; its direction may not have been known when it came */
-        if (channel->transfer != PDCP_INPUT || link->stored) {
+        if (channel->transfer != PDCP_INPUT || bus->link.stored) {
             const bool connected = channel->transfer == PDCP_INPUT && channel->link == PDCP_LINK_ACTIVE;
             answer_update(bus, channel->node, channel->index, connected ? PDCP_SUCCESS : PDCP_FAILURE);
             break;
         }
-        begin(link, todo, number, PDCP_NONE, STEP_READ_VID_PID);
-        take_old(link, channel);
+        begin(bus, todo, number, PDCP_NONE, STEP_READ_VID_PID);
+        take_old(bus, channel);
         break;
     }
 }
 
-static void start_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+static void start_wish(pdcp_bus_t *bus)
 {
-    pdcp_channel_t *input = &bus->nodes.channels[link->wish_input];
-    if (!is_ready(bus, link->wish_input) || !is_ready(bus, link->wish_output)) {
-        wish_ends(link, bus, now_ms, PDCP_ERR_NO_ANSWER);
+    pdcp_channel_t *input = &bus->nodes.channels[bus->link.wish_input];
+    if (!is_ready(bus, bus->link.wish_input) || !is_ready(bus, bus->link.wish_output)) {
+        wish_ends(bus, PDCP_ERR_NO_ANSWER);
         return;
     }
-    if (input->link == PDCP_LINK_ACTIVE && input->feed == link->wish_output) {
-        wish_ends(link, bus, now_ms, PDCP_OK);
+    if (input->link == PDCP_LINK_ACTIVE && input->feed == bus->link.wish_output) {
+        wish_ends(bus, PDCP_OK);
         return;
     }
     input->todo = PDCP_TODO_NONE;
-    begin(link, PDCP_TODO_CONNECT, link->wish_input, link->wish_output, STEP_INPUT_OFF);
-    link->for_host = true;
-    link->wish_input = PDCP_NONE;
-    take_old(link, input);
-    name_source(link, bus);
+    begin(bus, PDCP_TODO_CONNECT, bus->link.wish_input, bus->link.wish_output, STEP_INPUT_OFF);
+    bus->link.for_host = true;
+    bus->link.wish_input = PDCP_NONE;
+    take_old(bus, input);
+    name_source(bus);
 }
 
 /* The channel that is to be seen to next: what silences comes before what connects. */
@@ -718,16 +724,16 @@ static uint8_t next_todo(const pdcp_bus_t *bus)
 }
 
 /* Is there something to be done, other than to silence again? */
-static bool has_work(const pdcp_link_t *link, const pdcp_bus_t *bus)
+static bool has_work(const pdcp_bus_t *bus)
 {
-    const uint8_t next = link->due ? next_todo(bus) : (uint8_t)PDCP_NONE;
-    return link->wish_input != PDCP_NONE ||
+    const uint8_t next = bus->link.due ? next_todo(bus) : (uint8_t)PDCP_NONE;
+    return bus->link.wish_input != PDCP_NONE ||
            (next != PDCP_NONE && bus->nodes.channels[next].todo != PDCP_TODO_AGAIN);
 }
 
-bool pdcp_link_is_settled(const pdcp_link_t *link, const pdcp_bus_t *bus)
+bool pdcp_link_is_settled(const pdcp_bus_t *bus)
 {
-    return (!link->active || link->again) && !has_work(link, bus);
+    return (!bus->link.active || bus->link.again) && !has_work(bus);
 }
 
 /* Who waits for the device's place is served when a request of it ends, so that none may be broken off. */
@@ -737,35 +743,35 @@ static bool is_waited_for(const pdcp_bus_t *bus, uint8_t node)
 }
 
 /* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. */
-static void break_off(pdcp_link_t *link, pdcp_bus_t *bus)
+static void break_off(pdcp_bus_t *bus)
 {
-    if (link->at != PDCP_NONE) {
-        pdcp_request_cancel(bus, link->at);
-        link->at = PDCP_NONE;
+    if (bus->link.at != PDCP_NONE) {
+        pdcp_request_cancel(bus, bus->link.at);
+        bus->link.at = PDCP_NONE;
     }
-    link->active = false;
-    silence_again(link, channel_of(bus, link->input));
-    silence_again(link, channel_of(bus, link->output));
+    bus->link.active = false;
+    silence_again(bus, channel_of(bus, bus->link.input));
+    silence_again(bus, channel_of(bus, bus->link.output));
 }
 
-void pdcp_link_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms)
+void pdcp_link_step(pdcp_bus_t *bus)
 {
-    if (link->active && link->again && has_work(link, bus) && !is_waited_for(bus, link->at)) {
-        break_off(link, bus);
+    if (bus->link.active && bus->link.again && has_work(bus) && !is_waited_for(bus, bus->link.at)) {
+        break_off(bus);
     }
-    if (link->active && link->waiting) {
-        run(link, bus, now_ms);
+    if (bus->link.active && bus->link.waiting) {
+        run(bus);
     }
-    while (!link->active && link->due) {
+    while (!bus->link.active && bus->link.due) {
         const uint8_t next = next_todo(bus);
         const bool urgent = next != PDCP_NONE && bus->nodes.channels[next].todo <= PDCP_TODO_REMOVE;
-        if (link->wish_input != PDCP_NONE && !urgent) {
-            start_wish(link, bus, now_ms);
+        if (bus->link.wish_input != PDCP_NONE && !urgent) {
+            start_wish(bus);
         } else if (next != PDCP_NONE) {
-            start_todo(link, bus, next);
+            start_todo(bus, next);
         } else {
-            link->due = false;
+            bus->link.due = false;
         }
-        run(link, bus, now_ms);
+        run(bus);
     }
 }

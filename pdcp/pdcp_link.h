@@ -7,7 +7,13 @@
 #ifndef PDCP_LINK_H
 #define PDCP_LINK_H
 
-#include "pdcp_bus.h"
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_request.h"
+#include "pdcp_spec.h"
+
+struct pdcp_bus;
 
 typedef struct {
     bool planned;       /* the profile layer decides which links are made: none comes by itself */
@@ -27,61 +33,58 @@ typedef struct {
     uint8_t output;     /* channel number; PDCP_NONE: gone, or the job has none */
     bool output_was_on; /* before the job */
     int8_t status;      /* outcome so far, pdcp_status_t */
-    /* The input's source before the job, to be restored when it fails. */
-    pdcp_identity_t old_source;
-    uint8_t old_index;
-    uint8_t old_link;
-    uint8_t old_feed;
-    uint16_t old_type;
-    uint16_t old_profile;
     /* The link that the host has asked for; wish_input PDCP_NONE: none. */
     uint8_t wish_input;
     uint8_t wish_output;
+    /* The input's source before the job, to be restored when it fails. */
+    uint8_t old_index;
+    uint8_t old_link;
+    uint8_t old_feed;
+    pdcp_identity_t old_source;
+    uint16_t old_type;
+    uint16_t old_profile;
 } pdcp_link_t;
 
 /* Nothing is under way; planned stays as it is. */
-void pdcp_link_init(pdcp_link_t *link);
+void pdcp_link_init(struct pdcp_bus *bus);
 
 /* Is there neither a job nor anything to do, but to silence again what does not answer? */
-bool pdcp_link_is_settled(const pdcp_link_t *link, const pdcp_bus_t *bus);
+bool pdcp_link_is_settled(const struct pdcp_bus *bus);
 
 /* Lets an active link rest: both ends disabled, source remembered (D-PRO-9). */
-void pdcp_link_rest(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t input);
+void pdcp_link_rest(struct pdcp_bus *bus, uint8_t input);
 
 /* Asks for exactly this link. The outcome comes as PDCP_EVENT_WISH. False: another wish is under way. */
-bool pdcp_link_wish(pdcp_link_t *link, uint8_t output, uint8_t input);
+bool pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input);
 
 /* A wish that has not been started ends with status. Nothing happens when there is none. */
-void pdcp_link_forget_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, pdcp_status_t status);
+void pdcp_link_forget_wish(struct pdcp_bus *bus, pdcp_status_t status);
 
 /* The host waits no longer: its wish ends with PDCP_ERR_NO_ANSWER, and a link half made is undone. Returns
  * the place of the device whose request was broken off, PDCP_NONE: of none. */
-uint8_t pdcp_link_give_up_wish(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms);
+uint8_t pdcp_link_give_up_wish(struct pdcp_bus *bus);
 
 /* Is a wish of the host under way? */
-static inline bool pdcp_link_wish_waits(const pdcp_link_t *link)
-{
-    return link->wish_input != PDCP_NONE || (link->active && link->for_host);
-}
+bool pdcp_link_wish_waits(const struct pdcp_bus *bus);
 
 /* Takes the link of an input away. */
-void pdcp_link_remove(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t input);
+void pdcp_link_remove(struct pdcp_bus *bus, uint8_t input);
 
 /* A device sent Update Data Channel for its channel index. */
-void pdcp_link_on_update(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node, uint8_t index);
+void pdcp_link_on_update(struct pdcp_bus *bus, uint8_t node, uint8_t index);
 
 /* A device is set up (PDCP_NONE: the pause after a link that was not answered is over): inactive links whose
  * ends are both there are made. */
-void pdcp_link_on_ready(pdcp_link_t *link, pdcp_bus_t *bus, uint8_t node);
+void pdcp_link_on_ready(struct pdcp_bus *bus, uint8_t node);
 
 /* A device is gone or was reset: its links become inactive, what it fed is silenced (D-BUS-14). Its request
  * must be cancelled already; a job that was waiting for it goes on without it. */
-void pdcp_link_on_lost(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node);
+void pdcp_link_on_lost(struct pdcp_bus *bus, uint8_t node);
 
 /* A reply to a request of PDCP_CLIENT_LINK. */
-void pdcp_link_on_reply(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms, const pdcp_reply_t *reply);
+void pdcp_link_on_reply(struct pdcp_bus *bus, const pdcp_reply_t *reply);
 
 /* Starts what can be started. Costs nothing when there is nothing to do. */
-void pdcp_link_step(pdcp_link_t *link, pdcp_bus_t *bus, uint32_t now_ms);
+void pdcp_link_step(struct pdcp_bus *bus);
 
 #endif

@@ -151,6 +151,22 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
     input->source_profile = 0;
 }
 
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len)
+{
+    const uint16_t low = pdcp_value_u16(value, len, 0);
+    const uint16_t high = pdcp_value_u16(value, len, 2);
+    if (param == PDCP_IN_SOURCE_VID_PID) {
+        input->source.vid = low;
+        input->source.pid = high;
+    } else if (param == PDCP_IN_SOURCE_SERIAL) {
+        input->source.sn = low;
+        input->source_index = (uint8_t)(high & 0xFFu);
+    } else {
+        input->source_type = low;
+        input->source_profile = high;
+    }
+}
+
 static uint8_t take_channel(pdcp_nodes_t *nodes, uint8_t node, uint8_t index)
 {
     uint8_t i = 0;

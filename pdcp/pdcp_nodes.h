@@ -121,6 +121,9 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
 /* Makes the source of an input that of an unconnected one (D-BUS-7). */
 void pdcp_nodes_clear_source(pdcp_channel_t *input);
 
+/* Takes over a parameter that names the source of an input: 5, 6 or 8. */
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len);
+
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */
 bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);

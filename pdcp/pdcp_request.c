@@ -7,7 +7,7 @@
 
 static pdcp_request_t *request_of(pdcp_bus_t *bus, uint8_t node)
 {
-    return &bus->nodes.nodes[node].request;
+    return &pdcp_bus_node(bus, node)->request;
 }
 
 bool pdcp_request_is_idle(const pdcp_bus_t *bus, uint8_t node)
@@ -37,7 +37,7 @@ static void send_raw(pdcp_bus_t *bus, uint8_t node)
 
 /* Sends what the state asks for and waits for its answer. A frame that finds no room is repeated at the
  * deadline, like one that got lost on the way. */
-static void send(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+static void send(pdcp_bus_t *bus, uint8_t node)
 {
     const pdcp_request_t *request = request_of(bus, node);
     const uint8_t node_id = bus->nodes.nodes[node].node_id;
@@ -69,29 +69,28 @@ static void send(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
     default: /* GET_DATA: the device sends by itself */
         break;
     }
-    pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node),
-                    now_ms + bus->nodes.nodes[node].ack_ms);
+    pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + node), pdcp_bus_node(bus, node)->ack_ms);
 }
 
-static void enter(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_request_state_t state)
+static void enter(pdcp_bus_t *bus, uint8_t node, pdcp_request_state_t state)
 {
     pdcp_request_t *request = request_of(bus, node);
     request->state = (uint8_t)state;
     request->tries_left = PDCP_TRIES - 1;
-    send(bus, now_ms, node);
+    send(bus, node);
 }
 
-static void start(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_request_t *what)
+static void start(pdcp_bus_t *bus, uint8_t node, const pdcp_request_t *what)
 {
     pdcp_request_t *request = request_of(bus, node);
     *request = *what;
     request->restarts_left = PDCP_BULK_RESTARTS;
     pdcp_bus_count(bus, PDCP_STAT_REQUESTS);
-    enter(bus, now_ms, node, (pdcp_request_state_t)what->state);
+    enter(bus, node, (pdcp_request_state_t)what->state);
 }
 
-void pdcp_request_get(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client, uint8_t channel,
-                      uint8_t param, uint16_t max_size)
+void pdcp_request_get(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uint8_t channel, uint8_t param,
+                      uint16_t max_size)
 {
     const pdcp_request_t what = {.client = (uint8_t)client,
                                  .code = PDCP_GET_PARAMETER,
@@ -99,11 +98,11 @@ void pdcp_request_get(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_clien
                                  .channel = channel,
                                  .max_size = max_size,
                                  .state = PDCP_REQUEST_ANSWER};
-    start(bus, now_ms, node, &what);
+    start(bus, node, &what);
 }
 
-void pdcp_request_set(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client, uint8_t channel,
-                      uint8_t param, const uint8_t *bytes, uint16_t len)
+void pdcp_request_set(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uint8_t channel, uint8_t param,
+                      const uint8_t *bytes, uint16_t len)
 {
     pdcp_request_t what = {.client = (uint8_t)client,
                            .code = PDCP_SET_PARAMETER,
@@ -117,23 +116,21 @@ void pdcp_request_set(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_clien
     } else {
         memcpy(what.value, bytes, len);
     }
-    start(bus, now_ms, node, &what);
+    start(bus, node, &what);
 }
 
-void pdcp_request_command(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client, uint8_t code,
-                          uint16_t time_ms)
+void pdcp_request_command(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uint8_t code, uint16_t time_ms)
 {
     const pdcp_request_t what = {
         .client = (uint8_t)client, .code = code, .size = time_ms, .state = PDCP_REQUEST_ANSWER};
-    start(bus, now_ms, node, &what);
+    start(bus, node, &what);
 }
 
-void pdcp_request_raw(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
-                      const uint8_t *data, uint8_t dlc)
+void pdcp_request_raw(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, const uint8_t *data, uint8_t dlc)
 {
     const pdcp_request_t what = {
         .client = (uint8_t)client, .code = data[0], .bytes = data, .size = dlc, .state = PDCP_REQUEST_RAW};
-    start(bus, now_ms, node, &what);
+    start(bus, node, &what);
 }
 
 void pdcp_request_try_once(pdcp_bus_t *bus, uint8_t node)
@@ -170,7 +167,7 @@ static bool finish(pdcp_bus_t *bus, uint8_t node, pdcp_status_t status, pdcp_rep
     return true;
 }
 
-static bool restart_bulk(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_reply_t *reply)
+static bool restart_bulk(pdcp_bus_t *bus, uint8_t node, pdcp_reply_t *reply)
 {
     pdcp_request_t *request = request_of(bus, node);
     if (request->restarts_left == 0) {
@@ -178,17 +175,16 @@ static bool restart_bulk(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_re
     }
     request->restarts_left--;
     pdcp_bus_count(bus, PDCP_STAT_BULK_RESTARTS);
-    enter(bus, now_ms, node,
-          request->code == PDCP_GET_PARAMETER ? PDCP_REQUEST_GET_SIZE : PDCP_REQUEST_SET_SIZE);
+    enter(bus, node, request->code == PDCP_GET_PARAMETER ? PDCP_REQUEST_GET_SIZE : PDCP_REQUEST_SET_SIZE);
     return false;
 }
 
-static void start_packets(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_request_state_t state)
+static void start_packets(pdcp_bus_t *bus, uint8_t node, pdcp_request_state_t state)
 {
     pdcp_request_t *request = request_of(bus, node);
     request->offset = 0;
     request->packet_id = 0;
-    enter(bus, now_ms, node, state);
+    enter(bus, node, state);
 }
 
 static void late(pdcp_bus_t *bus)
@@ -203,8 +199,7 @@ static bool answers(const pdcp_request_t *request, const pdcp_msg_t *msg, pdcp_r
 }
 
 /* 83 and 84, and the answers to commands. */
-static bool on_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                      pdcp_reply_t *reply)
+static bool on_answer(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     const pdcp_request_t *request = request_of(bus, node);
     if (!answers(request, msg, PDCP_REQUEST_ANSWER) || msg->code != (request->code | PDCP_ANSWER)) {
@@ -213,8 +208,7 @@ static bool on_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp
     }
     const bool is_parameter = request->code == PDCP_GET_PARAMETER || request->code == PDCP_SET_PARAMETER;
     if (is_parameter && msg->result == PDCP_USE_BULK) {
-        enter(bus, now_ms, node,
-              request->code == PDCP_GET_PARAMETER ? PDCP_REQUEST_GET_SIZE : PDCP_REQUEST_SET_SIZE);
+        enter(bus, node, request->code == PDCP_GET_PARAMETER ? PDCP_REQUEST_GET_SIZE : PDCP_REQUEST_SET_SIZE);
         return false;
     }
     if (request->code == PDCP_GET_PARAMETER) {
@@ -224,8 +218,7 @@ static bool on_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp
     return finish(bus, node, msg->result == PDCP_SUCCESS ? PDCP_OK : PDCP_ERR_REFUSED, reply);
 }
 
-static bool on_get_size(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                        pdcp_reply_t *reply)
+static bool on_get_size(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     pdcp_request_t *request = request_of(bus, node);
     if (!answers(request, msg, PDCP_REQUEST_GET_SIZE)) {
@@ -242,12 +235,11 @@ static bool on_get_size(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pd
     if (msg->word == 0) {
         return finish(bus, node, PDCP_OK, reply);
     }
-    start_packets(bus, now_ms, node, PDCP_REQUEST_GET_DATA);
+    start_packets(bus, node, PDCP_REQUEST_GET_DATA);
     return false;
 }
 
-static bool on_set_size(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                        pdcp_reply_t *reply)
+static bool on_set_size(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     if (!answers(request_of(bus, node), msg, PDCP_REQUEST_SET_SIZE)) {
         late(bus);
@@ -256,7 +248,7 @@ static bool on_set_size(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pd
     if (msg->result != PDCP_SUCCESS) {
         return finish(bus, node, PDCP_ERR_REFUSED, reply);
     }
-    start_packets(bus, now_ms, node, PDCP_REQUEST_SET_DATA);
+    start_packets(bus, node, PDCP_REQUEST_SET_DATA);
     return false;
 }
 
@@ -268,8 +260,7 @@ static void answer_packet(pdcp_bus_t *bus, uint8_t node, uint8_t result)
 
 /* A packet from the device: the next one, the one before once more (its answer got lost, D-BUS-9), or a wrong
  * one. */
-static bool on_packet(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                      pdcp_reply_t *reply)
+static bool on_packet(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     pdcp_request_t *request = request_of(bus, node);
     const bool getting = request->state == PDCP_REQUEST_GET_DATA;
@@ -286,7 +277,7 @@ static bool on_packet(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp
     const uint16_t left = (uint16_t)(request->size - request->offset);
     if (msg->packet_id != request->packet_id || msg->len > left) {
         answer_packet(bus, node, PDCP_FAILURE);
-        return restart_bulk(bus, now_ms, node, reply);
+        return restart_bulk(bus, node, reply);
     }
     answer_packet(bus, node, PDCP_SUCCESS);
     reply->bytes = msg->value;
@@ -304,13 +295,11 @@ static bool on_packet(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp
         return finish(bus, node, PDCP_OK, reply);
     }
     request->tries_left = PDCP_TRIES - 1;
-    pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node),
-                    now_ms + bus->nodes.nodes[node].ack_ms);
+    pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + node), pdcp_bus_node(bus, node)->ack_ms);
     return !is_small;
 }
 
-static bool on_packet_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                             pdcp_reply_t *reply)
+static bool on_packet_answer(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     pdcp_request_t *request = request_of(bus, node);
     if (request->state != PDCP_REQUEST_SET_DATA) {
@@ -318,7 +307,7 @@ static bool on_packet_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, con
         return false;
     }
     if (msg->result != PDCP_SUCCESS) {
-        return restart_bulk(bus, now_ms, node, reply);
+        return restart_bulk(bus, node, reply);
     }
     const uint16_t left = (uint16_t)(request->size - request->offset);
     request->offset =
@@ -327,7 +316,7 @@ static bool on_packet_answer(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, con
     if (request->offset == request->size) {
         return finish(bus, node, PDCP_OK, reply);
     }
-    enter(bus, now_ms, node, PDCP_REQUEST_SET_DATA);
+    enter(bus, node, PDCP_REQUEST_SET_DATA);
     return false;
 }
 
@@ -352,8 +341,7 @@ bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t node, const can_frame_t *fra
     return finish(bus, node, PDCP_OK, reply);
 }
 
-bool pdcp_request_on_message(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                             pdcp_reply_t *reply)
+bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     reply_head(request_of(bus, node), reply);
     switch (msg->code) {
@@ -362,19 +350,19 @@ bool pdcp_request_on_message(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, con
     case PDCP_SUSPEND | PDCP_ANSWER:
     case PDCP_RELEASE | PDCP_ANSWER:
     case PDCP_RESET | PDCP_ANSWER:
-        return on_answer(bus, now_ms, node, msg, reply);
+        return on_answer(bus, node, msg, reply);
     case PDCP_BULK_GET | PDCP_ANSWER:
-        return on_get_size(bus, now_ms, node, msg, reply);
+        return on_get_size(bus, node, msg, reply);
     case PDCP_BULK_SET | PDCP_ANSWER:
-        return on_set_size(bus, now_ms, node, msg, reply);
+        return on_set_size(bus, node, msg, reply);
     case PDCP_BULK_DATA:
-        return on_packet(bus, now_ms, node, msg, reply);
+        return on_packet(bus, node, msg, reply);
     default: /* 8E: the arbitrator hands in no other */
-        return on_packet_answer(bus, now_ms, node, msg, reply);
+        return on_packet_answer(bus, node, msg, reply);
     }
 }
 
-bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pdcp_reply_t *reply)
+bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t node, pdcp_reply_t *reply)
 {
     pdcp_request_t *request = request_of(bus, node);
     reply_head(request, reply);
@@ -384,11 +372,11 @@ bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pd
     if (request->tries_left != 0) {
         request->tries_left--;
         pdcp_bus_count(bus, PDCP_STAT_REPEATS);
-        send(bus, now_ms, node);
+        send(bus, node);
         return false;
     }
     if (request->state == PDCP_REQUEST_GET_DATA) {
-        return restart_bulk(bus, now_ms, node, reply);
+        return restart_bulk(bus, node, reply);
     }
     return finish(bus, node, PDCP_ERR_NO_ANSWER, reply);
 }

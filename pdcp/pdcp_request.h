@@ -80,19 +80,19 @@ bool pdcp_request_is_idle(const struct pdcp_bus *bus, uint8_t node);
 
 /* Start a request; the device's place must be idle. The value to be set must stay where it is until the reply
  * when len is above 4. max_size: longest value accepted, longer ones fail with PDCP_ERR_BULK. */
-void pdcp_request_get(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
-                      uint8_t channel, uint8_t param, uint16_t max_size);
-void pdcp_request_set(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
-                      uint8_t channel, uint8_t param, const uint8_t *bytes, uint16_t len);
+void pdcp_request_get(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t channel,
+                      uint8_t param, uint16_t max_size);
+void pdcp_request_set(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t channel,
+                      uint8_t param, const uint8_t *bytes, uint16_t len);
 
 /* Suspend (time_ms: 0 = until released), Release or Reset Device [PDCP 3.2.4, 3.2.5, 3.2.7]. */
-void pdcp_request_command(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
-                          uint8_t code, uint16_t time_ms);
+void pdcp_request_command(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t code,
+                          uint16_t time_ms);
 
 /* Sends data[], 1 to 8 bytes beginning with a function code below PDCP_ANSWER, as it is. data[] must stay
  * where it is until the reply. */
-void pdcp_request_raw(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_client_t client,
-                      const uint8_t *data, uint8_t dlc);
+void pdcp_request_raw(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, const uint8_t *data,
+                      uint8_t dlc);
 
 /* Lets the request that is under way be sent no more than this once. */
 void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);
@@ -106,8 +106,7 @@ bool pdcp_request_on_frame(struct pdcp_bus *bus, uint8_t node, const can_frame_t
 
 /* A decoded message from a device, or the deadline of its request. True: reply says what follows. An answer
  * that belongs to no request is counted and otherwise ignored. */
-bool pdcp_request_on_message(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, const pdcp_msg_t *msg,
-                             pdcp_reply_t *reply);
-bool pdcp_request_on_deadline(struct pdcp_bus *bus, uint32_t now_ms, uint8_t node, pdcp_reply_t *reply);
+bool pdcp_request_on_message(struct pdcp_bus *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply);
+bool pdcp_request_on_deadline(struct pdcp_bus *bus, uint8_t node, pdcp_reply_t *reply);
 
 #endif

@@ -55,73 +55,73 @@ static const step_t *steps_of(pdcp_bus_t *bus, uint8_t node)
 }
 
 /* The device is left bound but unlinked; reported once, and tried again from time to time. */
-static void give_up(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+static void give_up(pdcp_bus_t *bus, uint8_t node)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     device->state = PDCP_NODE_FAILED;
-    pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node), now_ms + PDCP_SETUP_AGAIN_MS);
+    pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + node), PDCP_SETUP_AGAIN_MS);
     if (!device->setup_again) {
         device->setup_again = true;
         pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
-        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_SETUP_FAILED, node, PDCP_NONE, PDCP_OK);
+        pdcp_bus_tell_node(bus, PDCP_EVENT_SETUP_FAILED, node);
     }
 }
 
 /* The step has failed: the same again after a pause, so that on a bad line what is done stays done. */
-static void fail(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+static void fail(pdcp_bus_t *bus, uint8_t node)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     device->setup_attempts++;
     if (device->setup_attempts < PDCP_SETUP_ATTEMPTS) {
-        pdcp_timers_set(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node), now_ms + PDCP_SETUP_PAUSE_MS);
+        pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + node), PDCP_SETUP_PAUSE_MS);
     } else {
-        give_up(bus, now_ms, node);
+        give_up(bus, node);
     }
 }
 
-static void no_room(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+static void no_room(pdcp_bus_t *bus, uint8_t node)
 {
     pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
-    give_up(bus, now_ms, node);
+    give_up(bus, node);
 }
 
 /* Writes of the setup: transfer enabled 0, and the node id of an output. False: no node id is left. */
-static bool write_step(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, uint8_t param)
+static bool write_step(pdcp_bus_t *bus, uint8_t node, uint8_t param)
 {
     pdcp_channel_t *channel = current_channel(bus, node);
     uint8_t value = 0;
     if (param == PDCP_OUT_NODE_ID) {
         if (channel->node_id == 0) {
             pdcp_nodes_set_output_id(&bus->nodes, bus->nodes.nodes[node].setup_channel,
-                                     pdcp_bind_output_id(bind, bus, now_ms));
+                                     pdcp_bind_output_id(bus));
         }
         value = channel->node_id;
         if (value == 0) {
             return false;
         }
     }
-    pdcp_request_set(bus, now_ms, node, PDCP_CLIENT_SETUP, channel->index, param, &value, 1);
+    pdcp_request_set(bus, node, PDCP_CLIENT_SETUP, channel->index, param, &value, 1);
     return true;
 }
 
-void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t node)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     device->setup_due = false;
     const step_t step = steps_of(bus, node)[device->setup_step];
     if ((step & WRITE) != 0) {
-        if (!write_step(bind, bus, now_ms, node, (uint8_t)(step & PARAM))) {
-            no_room(bus, now_ms, node);
+        if (!write_step(bus, node, (uint8_t)(step & PARAM))) {
+            no_room(bus, node);
         }
         return;
     }
     const uint8_t index = device->setup_pass == PASS_DEVICE ? 0 : current_channel(bus, node)->index;
-    pdcp_request_get(bus, now_ms, node, PDCP_CLIENT_SETUP, index, (uint8_t)(step & PARAM), SETUP_VALUE_MAX);
+    pdcp_request_get(bus, node, PDCP_CLIENT_SETUP, index, (uint8_t)(step & PARAM), SETUP_VALUE_MAX);
 }
 
 void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     device->state = PDCP_NODE_SETUP;
     device->setup_pass = PASS_DEVICE;
     device->setup_step = 0;
@@ -132,17 +132,17 @@ void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
     device->beacon_ms = PDCP_BEACON_MS;
 }
 
-static void enter_pass(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pass_t pass)
+static void enter_pass(pdcp_bus_t *bus, uint8_t node, pass_t pass)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     if (device->first_channel == PDCP_NONE || pass > PASS_CHANNELS) {
         device->state = PDCP_NODE_READY;
         device->setup_again = false;
-        pdcp_bus_tell(bus, now_ms, PDCP_EVENT_READY, node, PDCP_NONE, PDCP_OK);
+        pdcp_bus_tell_node(bus, PDCP_EVENT_READY, node);
         return;
     }
     if (pass == PASS_CHANNELS && !pdcp_nodes_make_needs(&bus->nodes, node)) {
-        no_room(bus, now_ms, node);
+        no_room(bus, node);
         return;
     }
     device->setup_pass = (uint8_t)pass;
@@ -151,9 +151,9 @@ static void enter_pass(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, pass_t pa
 }
 
 /* The next step of this channel, the next channel, the next pass. */
-static void go_on(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
+static void go_on(pdcp_bus_t *bus, uint8_t node)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     device->setup_step++;
     device->setup_attempts = 0;
     device->setup_due = true;
@@ -168,7 +168,7 @@ static void go_on(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node)
         }
     }
     device->setup_due = false;
-    enter_pass(bus, now_ms, node, (pass_t)(device->setup_pass + 1));
+    enter_pass(bus, node, (pass_t)(device->setup_pass + 1));
 }
 
 static uint16_t clamp(uint16_t value, uint16_t low, uint16_t high)
@@ -192,7 +192,7 @@ void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, const uint8_t *val
 /* Takes over a device parameter. False: it does not fit, the attempt has failed. */
 static bool take_device(pdcp_bus_t *bus, uint8_t node, uint8_t param, const uint8_t *value, uint8_t len)
 {
-    pdcp_node_t *device = &bus->nodes.nodes[node];
+    pdcp_node_t *device = pdcp_bus_node(bus, node);
     const uint16_t low = pdcp_value_u16(value, len, 0);
     const uint16_t high = pdcp_value_u16(value, len, 2);
     switch (param) {
@@ -231,57 +231,41 @@ static void set_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
     channel->transfer = transfer;
 }
 
-/* An input's own idea of its source counts only while the arbitrator knows of no link. */
-static void take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len)
-{
-    const uint16_t low = pdcp_value_u16(value, len, 0);
-    const uint16_t high = pdcp_value_u16(value, len, 2);
-    if (input->link != PDCP_LINK_NONE) {
-        return;
-    }
-    if (param == PDCP_IN_SOURCE_VID_PID) {
-        input->source.vid = low;
-        input->source.pid = high;
-    } else if (param == PDCP_IN_SOURCE_SERIAL) {
-        input->source.sn = low;
-        input->source_index = pdcp_value_u8(value, len, 2);
-    } else {
-        input->source_type = low;
-        input->source_profile = high;
-    }
-}
-
 /* Takes over a channel parameter; bit strings come in pieces. False: the attempt has failed. */
 static bool take_channel(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
 {
-    const uint8_t number = bus->nodes.nodes[node].setup_channel;
+    const uint8_t number = pdcp_bus_node(bus, node)->setup_channel;
     pdcp_channel_t *channel = &bus->nodes.channels[number];
     const uint8_t len = (uint8_t)reply->len;
+    const uint16_t low = pdcp_value_u16(reply->bytes, len, 0);
     switch (reply->param) {
     case PDCP_CH_TYPE_PROFILE:
-        channel->type = pdcp_value_u16(reply->bytes, len, 0);
+        channel->type = low;
         channel->profile = pdcp_value_u16(reply->bytes, len, 2);
-        return true;
+        break;
     case PDCP_CH_TRANSFER_TYPE: {
-        const uint8_t transfer = pdcp_value_u8(reply->bytes, len, 0);
+        const uint8_t transfer = (uint8_t)(low & 0xFFu);
         if (transfer != PDCP_INPUT && transfer != PDCP_OUTPUT) {
             return false;
         }
         set_direction(bus, number, transfer);
-        return true;
+        break;
     }
     case PDCP_CH_REQUIRED:
     case PDCP_CH_DESIRED:
         pdcp_nodes_put_needs(&bus->nodes, number, reply->param == PDCP_CH_DESIRED, reply->offset,
                              reply->bytes, reply->len);
-        return true;
+        break;
     case PDCP_IN_TERMINAL_PROFILE:
-        channel->terminal_profile = pdcp_value_u16(reply->bytes, len, 0);
-        return true;
-    default:
-        take_source(channel, reply->param, reply->bytes, len);
-        return true;
+        channel->terminal_profile = low;
+        break;
+    default: /* its own idea of its source counts only while the arbitrator knows of no link */
+        if (channel->link == PDCP_LINK_NONE) {
+            pdcp_nodes_take_source(channel, reply->param, reply->bytes, len);
+        }
+        break;
     }
+    return true;
 }
 
 /* Takes over a value or a piece of one. Numbers stand in the first piece; bit strings may have more. */
@@ -304,10 +288,10 @@ static bool take(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
     return take_channel(bus, node, reply);
 }
 
-pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply)
+pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
 {
     static const uint8_t nothing[1] = {0};
-    const pdcp_node_t *device = &bus->nodes.nodes[node];
+    const pdcp_node_t *device = pdcp_bus_node(bus, node);
     const bool mandatory = (steps_of(bus, node)[device->setup_step] & MANDATORY) != 0;
     const bool has_value = !reply->done || reply->status == PDCP_OK;
     pdcp_reply_t part = *reply;
@@ -317,16 +301,16 @@ pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node
     if (has_value && !take(bus, node, &part)) {
         const bool other = device->setup_pass == PASS_DEVICE && reply->param <= PDCP_DEV_SERIAL;
         pdcp_request_cancel(bus, node);
-        fail(bus, now_ms, node);
+        fail(bus, node);
         return other ? PDCP_ERR_UNKNOWN : PDCP_OK;
     }
     if (!reply->done) {
         return PDCP_OK;
     }
     if (reply->status == PDCP_ERR_NO_ANSWER || (reply->status != PDCP_OK && mandatory)) {
-        fail(bus, now_ms, node);
+        fail(bus, node);
     } else {
-        go_on(bus, now_ms, node);
+        go_on(bus, node);
     }
     return PDCP_OK;
 }

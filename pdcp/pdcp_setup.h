@@ -8,7 +8,6 @@
 #ifndef PDCP_SETUP_H
 #define PDCP_SETUP_H
 
-#include "pdcp_bind.h"
 #include "pdcp_bus.h"
 
 /* Puts a device at the beginning of its setup, in whatever state it is; its place must have no request under
@@ -17,7 +16,7 @@ void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node);
 
 /* Sends the request of the current step. To be called when the device's setup_due is set and it has no
  * request under way. */
-void pdcp_setup_ask(const pdcp_bind_t *bind, pdcp_bus_t *bus, uint32_t now_ms, uint8_t node);
+void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t node);
 
 /* Takes over a device's acknowledgement time (parameter 11) or beacon interval (10), as read, or as written
  * by the host (D-BUS-25), within the limits of D-BUS-13. Other parameters: nothing. */
@@ -25,6 +24,6 @@ void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, const uint8_t *val
 
 /* A reply to a request of PDCP_CLIENT_SETUP. When the step has failed, the timer of the device's requests
  * runs until it is to be tried again. PDCP_ERR_UNKNOWN: the device is another than the bound one. */
-pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint32_t now_ms, uint8_t node, const pdcp_reply_t *reply);
+pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply);
 
 #endif

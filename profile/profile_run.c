@@ -361,7 +361,7 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     const uint8_t status = channel_of(arb, input)->link;
     const uint8_t entry = entry_of(run, arb, input);
     if (status == PDCP_LINK_NONE) {
-        if (arb->link.kind == PDCP_TODO_REMOVE && !get_bit(run->dropping, input)) {
+        if (arb->bus.link.kind == PDCP_TODO_REMOVE && !get_bit(run->dropping, input)) {
             on_removed(run, input, entry);
         }
         set_bit(run->dropping, input, false);

@@ -126,7 +126,7 @@ static void do_answer(job_t *job, uint32_t count)
         if (number == 0) {
             check(arb->bus.nodes.nodes[node].state == PDCP_NODE_READY, "the setup did not end");
             pdcp_setup_start(&arb->bus, node);
-            pdcp_setup_ask(&arb->bind, &arb->bus, now_ms(job), node);
+            pdcp_setup_ask(&arb->bus, node);
         }
         take(job, &job->log->answers[number]);
     }

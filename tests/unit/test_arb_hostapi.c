@@ -423,7 +423,7 @@ static void test_a_reset_behind_a_long_transfer(void)
 {
     exchange_add_output(&x, "FE");
     x.arb->bus.nodes.nodes[0].ack_ms = 500;
-    pdcp_request_get(&x.arb->bus, x.now_ms, 0, PDCP_CLIENT_NONE, 0, 7, 512);
+    pdcp_request_get(&x.arb->bus, 0, PDCP_CLIENT_NONE, 0, 7, 512);
     exchange_tx(&x, "311#03 07 00");
     ask(0x230D, BYTES(0));
     for (int ms = 0; ms < 999; ms++) {

@@ -272,13 +272,13 @@ static void test_the_active_configuration_is_written_away(void)
     ask(0x2407, BYTES(1, 0));
     wait_for_answer();
     expect(0x2408, BYTES(0, 0));
-    TEST_ASSERT_TRUE(app.arb.link.stored);
+    TEST_ASSERT_TRUE(app.arb.bus.link.stored);
     ask(0x240D, BYTES(0, 0, 6, 0, 1, 0, 0, 15, 0, 0));
     wait_for_answer();
     expect(0x240E, NULL, 0);
     TEST_ASSERT_EQUAL(0, app.limb.active);
     TEST_ASSERT_FALSE(app.limb.run.stored);
-    TEST_ASSERT_FALSE(app.arb.link.stored);
+    TEST_ASSERT_FALSE(app.arb.bus.link.stored);
 }
 
 static void make_link(void)

@@ -99,7 +99,7 @@ static void test_identities_outlive_a_power_cycle(void)
     exchange_pass(&x, 600);
     TEST_ASSERT_FALSE(app.store.changed);
     start();
-    TEST_ASSERT_EQUAL(2, app.arb.bind.remembered_count);
+    TEST_ASSERT_EQUAL(2, app.arb.bus.bind.remembered_count);
     exchange_rx(&x, "655#01 0200 0200 0400");
     exchange_tx(&x, "355#81 11 0200 0200 0400");
 }
@@ -135,9 +135,9 @@ static void test_power_may_fail_at_any_byte(void)
         bytes_left_of_last = cut;
         exchange_pass(&x, 600);
         start();
-        const uint8_t count = app.arb.bind.remembered_count;
+        const uint8_t count = app.arb.bus.bind.remembered_count;
         TEST_ASSERT_TRUE(count == 1 || count == 2);
-        TEST_ASSERT_EQUAL_HEX8(0x11, app.arb.bind.remembered[count - 1].node_id);
+        TEST_ASSERT_EQUAL_HEX8(0x11, app.arb.bus.bind.remembered[count - 1].node_id);
         old += count == 1 ? 1 : 0;
         fresh += count == 2 ? 1 : 0;
     }
@@ -160,7 +160,7 @@ static void test_a_damaged_copy_is_seen_and_not_used(void)
             memory[area * KEPT + byte] ^= 0x10;
             start();
             TEST_ASSERT_EQUAL(1, app.store.damaged);
-            TEST_ASSERT_GREATER_OR_EQUAL(1, app.arb.bind.remembered_count);
+            TEST_ASSERT_GREATER_OR_EQUAL(1, app.arb.bus.bind.remembered_count);
         }
     }
 }
@@ -181,7 +181,7 @@ static void test_a_bind_between_two_pages(void)
     for (uint8_t i = 0; i < 24; i++) {
         const pdcp_remembered_t entry = {.identity = {7, 7, (uint16_t)(100 + i)},
                                          .node_id = (uint8_t)(0x60 + i)};
-        TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&app.arb.bind, &entry));
+        TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&app.arb.bus.bind, &entry));
     }
     exchange_rx(&x, "650#01 0900 0900 0900");
     (void)exchange_drain(&x);
@@ -191,7 +191,7 @@ static void test_a_bind_between_two_pages(void)
     TEST_ASSERT_FALSE(app.store.changed);
     start();
     TEST_ASSERT_EQUAL(0, app.store.damaged);
-    TEST_ASSERT_EQUAL(25, app.arb.bind.remembered_count);
+    TEST_ASSERT_EQUAL(25, app.arb.bus.bind.remembered_count);
 }
 
 int main(void)

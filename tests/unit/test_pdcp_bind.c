@@ -106,7 +106,7 @@ static void test_an_identity_keeps_its_id(void)
 static void test_a_remembered_id_is_given_away_last(void)
 {
     const pdcp_remembered_t entry = {.identity = {1, 1, 1}, .node_id = 0x20};
-    TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bind, &entry));
+    TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bus.bind, &entry));
     exchange_rx(&x, "620#01 3412 7856 BC9A");
     exchange_tx(&x, "320#81 01 3412 7856 BC9A");
     for (unsigned id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
@@ -121,7 +121,7 @@ static void test_a_remembered_id_is_given_away_last(void)
 
 static void test_stored_identities_that_cannot_be_are_left_out(void)
 {
-    pdcp_bind_t *bind = &x.arb->bind;
+    pdcp_bind_t *bind = &x.arb->bus.bind;
     const pdcp_remembered_t good = {.identity = {1, 1, 1}, .node_id = 7};
     const pdcp_remembered_t same_id = {.identity = {1, 1, 2}, .node_id = 7};
     const pdcp_remembered_t same_identity = {.identity = {1, 1, 1}, .node_id = 8};
@@ -140,13 +140,13 @@ static void test_the_oldest_identity_is_forgotten_first(void)
 {
     for (unsigned i = 0; i < PDCP_IDENTITIES_MAX; i++) {
         const pdcp_remembered_t entry = {.identity = {1, 1, (uint16_t)(i + 1)}, .node_id = (uint8_t)(i + 1)};
-        TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bind, &entry));
+        TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bus.bind, &entry));
     }
     exchange_rx(&x, "6F0#01 0900 0900 0900");
     exchange_tx(&x, "3F0#81 F0 0900 0900 0900");
-    TEST_ASSERT_EQUAL(PDCP_IDENTITIES_MAX, x.arb->bind.remembered_count);
-    TEST_ASSERT_EQUAL(0xF0, x.arb->bind.remembered[0].node_id);
-    TEST_ASSERT_EQUAL(PDCP_IDENTITIES_MAX - 1, x.arb->bind.remembered[PDCP_IDENTITIES_MAX - 1].node_id);
+    TEST_ASSERT_EQUAL(PDCP_IDENTITIES_MAX, x.arb->bus.bind.remembered_count);
+    TEST_ASSERT_EQUAL(0xF0, x.arb->bus.bind.remembered[0].node_id);
+    TEST_ASSERT_EQUAL(PDCP_IDENTITIES_MAX - 1, x.arb->bus.bind.remembered[PDCP_IDENTITIES_MAX - 1].node_id);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_IDENTITIES));
 }
 

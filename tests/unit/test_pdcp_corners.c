@@ -252,7 +252,7 @@ static void in_use(unsigned first, unsigned last)
 static void remember(uint16_t serial, uint8_t id)
 {
     const pdcp_remembered_t entry = {.identity = {2, 2, serial}, .node_id = id};
-    TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bind, &entry));
+    TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bus.bind, &entry));
 }
 
 static void test_stored_identities_beyond_the_table_are_left_out(void)
@@ -261,7 +261,7 @@ static void test_stored_identities_beyond_the_table_are_left_out(void)
     for (uint8_t i = 1; i <= PDCP_IDENTITIES_MAX; i++) {
         remember(i, i);
     }
-    TEST_ASSERT_FALSE(pdcp_bind_remember_stored(&x.arb->bind, &more));
+    TEST_ASSERT_FALSE(pdcp_bind_remember_stored(&x.arb->bus.bind, &more));
     asks_for(0x63, PDCP_IDENTITIES_MAX); /* the last one that fitted */
     is_told(0x63, PDCP_IDENTITIES_MAX, PDCP_IDENTITIES_MAX);
 }
@@ -276,8 +276,8 @@ static void test_an_identity_whose_id_is_in_use_gets_another(void)
     exchange_silence(&x);
     asks_for(1, 5);
     is_told(1, 1, 5);
-    TEST_ASSERT_EQUAL(1, x.arb->bind.remembered_count);
-    TEST_ASSERT_EQUAL(1, x.arb->bind.remembered[0].node_id);
+    TEST_ASSERT_EQUAL(1, x.arb->bus.bind.remembered_count);
+    TEST_ASSERT_EQUAL(1, x.arb->bus.bind.remembered[0].node_id);
 }
 
 static void test_a_remembered_id_in_use_is_given_to_nobody(void)
@@ -675,7 +675,7 @@ static void test_what_else_cannot_be_a_link(void)
 
 static void remove_link(uint8_t node, unsigned id)
 {
-    pdcp_link_remove(&x.arb->link, &x.arb->bus, number(node, 1));
+    pdcp_link_remove(&x.arb->bus, number(node, 1));
     wrote(id, 4, 1, "00");
     wrote(id, 7, 1, "00 00");
     wrote(id, 8, 1, "0000 0000");

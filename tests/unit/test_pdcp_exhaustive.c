@@ -150,11 +150,11 @@ static void enter_state(pdcp_request_state_t state)
     exchange_add_output(&x, "FE");
     switch (state) {
     case PDCP_REQUEST_ANSWER:
-        pdcp_request_get(bus, x.now_ms, 0, PDCP_CLIENT_NONE, 0, 7, 16);
+        pdcp_request_get(bus, 0, PDCP_CLIENT_NONE, 0, 7, 16);
         break;
     case PDCP_REQUEST_GET_SIZE:
     case PDCP_REQUEST_GET_DATA:
-        pdcp_request_get(bus, x.now_ms, 0, PDCP_CLIENT_NONE, 0, 7, 16);
+        pdcp_request_get(bus, 0, PDCP_CLIENT_NONE, 0, 7, 16);
         exchange_rx(&x, "211#83 02 07 00");
         if (state == PDCP_REQUEST_GET_DATA) {
             exchange_rx(&x, "211#8C 01 07 00 0A00");
@@ -162,13 +162,13 @@ static void enter_state(pdcp_request_state_t state)
         break;
     case PDCP_REQUEST_SET_SIZE:
     case PDCP_REQUEST_SET_DATA:
-        pdcp_request_set(bus, x.now_ms, 0, PDCP_CLIENT_NONE, 0, 7, long_value, 10);
+        pdcp_request_set(bus, 0, PDCP_CLIENT_NONE, 0, 7, long_value, 10);
         if (state == PDCP_REQUEST_SET_DATA) {
             exchange_rx(&x, "211#8D 01 07 00 0A00");
         }
         break;
     case PDCP_REQUEST_RAW:
-        pdcp_request_raw(bus, x.now_ms, 0, PDCP_CLIENT_NONE, raw, 3);
+        pdcp_request_raw(bus, 0, PDCP_CLIENT_NONE, raw, 3);
         break;
     default:
         break;
@@ -344,7 +344,7 @@ static void expect_outcome(const devices_t *devices, uint8_t output, uint8_t inp
         TEST_ASSERT_EQUAL_MESSAGE(devices->failing == 2, made, name); /* D-BUS-20 */
         TEST_ASSERT_EQUAL_MESSAGE(made, channels[input].enabled, name);
         TEST_ASSERT_EQUAL_MESSAGE(made, channels[output].enabled, name);
-        TEST_ASSERT_FALSE_MESSAGE(x.arb->link.active, name);
+        TEST_ASSERT_FALSE_MESSAGE(x.arb->bus.link.active, name);
     }
 }
 

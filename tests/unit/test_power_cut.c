@@ -477,7 +477,7 @@ static arb_flags_t flags;
 
 static void load_store(void)
 {
-    pdcp_bind_init(&bind);
+    memset(&bind, 0, sizeof bind);
     arb_store_load(&store, &port, &bind);
     arb_store_share(&store, &nvm);
 }

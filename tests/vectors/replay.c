@@ -298,7 +298,7 @@ static void do_link(replay_t *replay, char *words[], size_t count)
 static void do_unlink(replay_t *replay, char *words[], size_t count)
 {
     (void)count;
-    pdcp_link_remove(&replay->arb.link, &replay->arb.bus, channel_of(replay, words[1]));
+    pdcp_link_remove(&replay->arb.bus, channel_of(replay, words[1]));
 }
 
 static void command(replay_t *replay, const char *node, uint8_t code, uint16_t time_ms)
@@ -343,7 +343,7 @@ static void do_remember(replay_t *replay, char *words[], size_t count)
     entry.identity.pid = (uint16_t)number(replay, pid + 1, 16, 0xFFFF, ':');
     entry.identity.sn = (uint16_t)number(replay, serial + 1, 16, 0xFFFF, '\0');
     entry.node_id = byte_of(replay, words[2]);
-    must(replay, pdcp_bind_remember_stored(&replay->arb.bind, &entry));
+    must(replay, pdcp_bind_remember_stored(&replay->arb.bus.bind, &entry));
 }
 
 /* As many devices bind as there are places; their frames are not shown. */

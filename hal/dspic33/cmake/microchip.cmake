@@ -36,7 +36,7 @@ if(XC_DSC_DFP)
     string(APPEND CMAKE_C_FLAGS_INIT " -mdfp=${XC_DSC_DFP}")
 endif()
 # -O1 is what every licence has. With -Os the compiler does no inlining at all unless it is asked for by name; functions
-# that are called once cost least where they are called.
+# that are called once cost least where they are called. What a pointer to an element saves, forwprop would undo.
 set(CMAKE_C_FLAGS_RELEASE "-O1" CACHE STRING "")
-set(CMAKE_C_FLAGS_MINSIZEREL "-Os -finline -finline-functions-called-once -fno-caller-saves" CACHE STRING "")
+set(CMAKE_C_FLAGS_MINSIZEREL "-Os -finline -finline-functions-called-once -fno-caller-saves -fno-tree-forwprop -fno-if-conversion" CACHE STRING "")
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)

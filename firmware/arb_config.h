@@ -29,7 +29,8 @@ enum {
     ARB_CONFIG_AREAS = 2,
     ARB_CONFIG_AREA = 8192,       /* bytes of an area */
     ARB_CONFIG_STRING_MAX = 7680, /* longest string: 8 configurations of 16 links take 7350 */
-    ARB_CONFIG_READ_MAX = 128,    /* bytes read at a time: 3.2 ms at a 24LC256 */
+    ARB_CONFIG_READ_MAX = 32,     /* bytes read at a time: 0.8 ms at a 24LC256 */
+    ARB_CONFIG_RAW_MAX = 128,     /* bytes that the host may read at a time */
     ARB_CONFIG_PACE_MS = 1,       /* between two reads: the bus goes on */
     ARB_CONFIG_POLLS_MAX = 50     /* a job that waits longer for the memory, 250 ms, has failed */
 };

@@ -32,6 +32,13 @@ bool arb_call_wait(arb_call_t *call, uint16_t limit_ms)
     return !pdcp_time_reached(call->now_ms, turn->until_ms);
 }
 
+uint8_t arb_call_again(arb_call_t *call)
+{
+    call->turn->waiting = true;
+    call->turn->until_ms = call->now_ms;
+    return ARB_PENDING;
+}
+
 uint8_t arb_call_started_limited(arb_call_t *call)
 {
     arb_turn_t *turn = call->turn;

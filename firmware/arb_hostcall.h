@@ -43,6 +43,9 @@ uint8_t arb_call_started(arb_call_t *call);
 /* Waits until limit_ms after the first call for this request. False: that time is over. */
 bool arb_call_wait(arb_call_t *call, uint16_t limit_ms);
 
+/* The handler is called again with the next step, which is due at once. */
+uint8_t arb_call_again(arb_call_t *call);
+
 /* Is a setup or the planner running? What changes links waits for their end (D-API-6). */
 bool arb_call_is_busy(const arb_call_t *call);
 

@@ -78,21 +78,35 @@ static uint8_t error_of_config(arb_call_t *call, int8_t status)
     }
 }
 
-/* 240Ah: offset, length. */
+/* 240Ah: offset, length. Read in pieces, a step each: the bus goes on between them. */
 static uint8_t read_configs(arb_call_t *call)
 {
+    arb_turn_t *turn = call->turn;
     arb_config_t *config = &call->env->limb->config;
     const uint16_t offset = arb_host_get_u16(&call->payload[0]);
-    uint8_t len = call->payload[2];
-    if (len > ARB_CONFIG_READ_MAX) {
+    const uint8_t len = call->payload[2];
+    uint8_t piece = (uint8_t)(len - turn->value_len);
+    if (len > ARB_CONFIG_RAW_MAX) {
         return ARB_ERR_VALUE;
     }
     const arb_config_status_t status =
-        arb_config_read_raw(config, call->env->nvm, offset, &call->answer[4], &len);
+        arb_config_read_raw(config, call->env->nvm, (uint16_t)(offset + turn->value_len),
+                            &call->answer[4 + turn->value_len], &piece);
+    if (status == ARB_CONFIG_ERR_BUSY && turn->value_len != 0) { /* it may become another string */
+        turn->value_len = 0;
+        turn->waiting = false;
+    }
+    if (status != ARB_CONFIG_OK) {
+        return error_of_config(call, (int8_t)status);
+    }
+    turn->value_len = (uint16_t)(turn->value_len + piece);
+    if (piece == ARB_CONFIG_READ_MAX && turn->value_len < len) {
+        return arb_call_again(call);
+    }
     arb_host_put_u16(&call->answer[0], arb_config_length(config));
     arb_host_put_u16(&call->answer[2], offset);
-    call->answer_len = (uint16_t)(4 + len);
-    return error_of_config(call, (int8_t)status);
+    call->answer_len = (uint16_t)(4 + turn->value_len);
+    return ARB_OK;
 }
 
 static void on_piece_written(void *ctx, arb_config_status_t status)

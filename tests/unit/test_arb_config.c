@@ -154,9 +154,9 @@ static void expect_now(const uint8_t *wanted, uint16_t len)
     static uint8_t bytes[400];
     TEST_ASSERT_EQUAL(len, arb_config_length(&config));
     for (uint16_t at = 0; at < len;) {
-        uint8_t n = 50;
+        uint8_t n = 30;
         TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_read_raw(&config, &nvm, at, &bytes[at], &n));
-        TEST_ASSERT_EQUAL(len - at < 50 ? len - at : 50, n);
+        TEST_ASSERT_EQUAL(len - at < 30 ? len - at : 30, n);
         at = (uint16_t)(at + n);
     }
     TEST_ASSERT_EQUAL_HEX8_ARRAY(wanted, bytes, len);
@@ -370,8 +370,8 @@ static void test_raw_reading(void)
     uint8_t len = 255;
     (void)save(1, 3, 0x5300); /* 183 bytes */
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_read_raw(&config, &nvm, 3, bytes, &len));
-    TEST_ASSERT_EQUAL(128, len);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){2, 1, 0, 3, 3, 0, LINK(1, 0)}), bytes, 63);
+    TEST_ASSERT_EQUAL(32, len);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){2, 1, 0, 3, 3, 0, LINK(1, 0)}), bytes, 32);
     len = 10;
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_read_raw(&config, &nvm, 180, bytes, &len));
     TEST_ASSERT_EQUAL(3, len);

@@ -251,6 +251,58 @@ static void test_configurations_there_and_back(void)
     expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
 }
 
+enum { LONG = 102 };
+
+/* One configuration, number 3, without links, with 30 entries that nobody knows. */
+static void write_long_string(uint8_t *string)
+{
+    static const uint8_t head[] = {1, 1, 0, 2, 3, 0, 3, 0, 0};
+    uint8_t piece[4 + LONG] = {0, 0, LONG, 0};
+    memcpy(string, head, sizeof head);
+    for (uint8_t at = sizeof head; at < LONG - 3; at = (uint8_t)(at + 3)) {
+        string[at] = 0x80;
+        string[at + 1] = at;
+        string[at + 2] = 7;
+    }
+    memcpy(&string[LONG - 3], (const uint8_t[]){15, 0, 0}, 3);
+    memcpy(&piece[4], string, LONG);
+    exchange_pass(&x, 600);
+    ask(0x240D, piece, sizeof piece);
+    wait_for_answer();
+    expect(0x240E, NULL, 0);
+}
+
+/* The memory is slow: 32 bytes a step. */
+static void test_many_bytes_are_read_in_steps(void)
+{
+    uint8_t answer[4 + LONG] = {LONG, 0, 0, 0};
+    write_long_string(&answer[4]);
+    ask(0x240A, BYTES(0, 0, 128));
+    for (int i = 0; i < 2; i++) {
+        TEST_ASSERT_EQUAL_UINT32(x.now_ms, arb_app_step(&app, x.now_ms));
+        TEST_ASSERT_EQUAL(0, hostlink_waiting());
+    }
+    (void)arb_app_step(&app, x.now_ms);
+    expect(0x240B, answer, sizeof answer);
+}
+
+static void on_erased(void *ctx, arb_config_status_t status)
+{
+    (void)ctx;
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, status);
+}
+
+/* A string that becomes another one while it is read is read anew. */
+static void test_a_string_that_changes_is_read_anew(void)
+{
+    uint8_t string[LONG];
+    write_long_string(string);
+    ask(0x240A, BYTES(0, 0, 128));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_erase(&app.limb.config, 3, on_erased, NULL, x.now_ms));
+    wait_for_answer();
+    expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
+}
+
 /* Save 0 with none active takes the lowest free number, which becomes active. */
 static void test_save_and_what_the_info_says(void)
 {
@@ -505,6 +557,8 @@ int main(void)
     RUN_TEST(test_reading_configurations);
     RUN_TEST(test_writing_configurations_that_cannot_be);
     RUN_TEST(test_configurations_there_and_back);
+    RUN_TEST(test_many_bytes_are_read_in_steps);
+    RUN_TEST(test_a_string_that_changes_is_read_anew);
     RUN_TEST(test_save_and_what_the_info_says);
     RUN_TEST(test_the_active_configuration_is_written_away);
     RUN_TEST(test_a_link_is_removed);

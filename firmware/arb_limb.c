@@ -324,7 +324,7 @@ static void end_check(arb_limb_t *limb, uint32_t now_ms)
 static void plan(arb_limb_t *limb, pdcp_arb_t *arb, profile_purpose_t purpose, uint8_t what)
 {
     limb->stage = STAGE_PLAN;
-    limb->plan_error = ARB_OK;
+    limb->overflow = false;
     profile_run_begin(&limb->run, arb, purpose, what);
 }
 
@@ -334,11 +334,12 @@ static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
         end(limb, ARB_ERR_STORAGE, 0);
         return;
     }
+    const bool overflow = limb->overflow;
     set_active(limb, limb->number);
     plan(limb, arb, PROFILE_FOR_LOAD, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE);
     (void)profile_run_take_change(&limb->run);
     limb->unsaved = false;
-    limb->plan_error = limb->overflow ? ARB_ERR_STORAGE : ARB_OK; /* too many devices: the rest is left out */
+    limb->overflow = overflow; /* the rest is left out */
 }
 
 static uint8_t begin_erase(arb_limb_t *limb, uint32_t now_ms, uint8_t argument)
@@ -497,7 +498,7 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
     }
     const bool handed = profile_run_step(&limb->run, arb, now_ms);
     if (limb->stage == STAGE_PLAN && !limb->run.planning) {
-        end(limb, limb->plan_error, limb->run.moves);
+        end(limb, limb->overflow ? ARB_ERR_STORAGE : ARB_OK, limb->run.moves);
     }
     auto_save(limb, arb, now_ms);
     return handed;

@@ -45,10 +45,9 @@ typedef struct {
     bool ended;     /* the outcome is there */
     uint8_t error;  /* arb_error_t */
     uint16_t result;
-    bool told;          /* active and stored configurations are as the host knows them */
-    bool unsaved;       /* the configuration was changed, for auto-save */
-    uint8_t plan_error; /* of the action that the plan under way is for */
-    bool overflow;      /* the configuration has more devices than there is room for */
+    bool told;     /* active and stored configurations are as the host knows them */
+    bool unsaved;  /* the configuration was changed, for auto-save */
+    bool overflow; /* the configuration has more devices than there is room for */
     uint32_t changed_ms;
     /* Start-up: the score of the configuration that is being read and of the best one so far (D-PRO-4). */
     uint8_t best;

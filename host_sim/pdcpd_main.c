@@ -222,8 +222,8 @@ static void work_outside(daemon_t *daemon)
     }
     const uint32_t next_ms = arb_app_step(&daemon->app, now_ms);
     const int32_t wait_ms = (int32_t)(next_ms - now_ms);
-    loop_set_deadline_us(daemon->loop,
-                         now_us / 1000u * 1000u + (wait_ms > 0 ? (uint64_t)wait_ms : 1u) * 1000u);
+    const uint64_t tick_us = now_us / 1000u * 1000u;
+    loop_set_deadline_us(daemon->loop, wait_ms > 0 ? tick_us + (uint64_t)wait_ms * 1000u : now_us);
 }
 
 /* One turn with the bus in this process. */

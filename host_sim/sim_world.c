@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+enum { TURNS_MAX = 10000 }; /* of the application at one time: more is an error of its own */
+
 void sim_world_init(sim_world_t *world, uint64_t now_us, uint32_t clock_ms)
 {
     memset(world, 0, sizeof *world);
@@ -98,11 +100,16 @@ static void step_member(sim_world_t *world, sim_world_member_t *member, uint64_t
     }
 }
 
+/* The application's processor is as fast as it has to be: what goes on at once takes no time. */
 static void step_app(sim_world_t *world, uint64_t now_us)
 {
     const uint32_t now_ms = ms_at(world, now_us);
-    const uint32_t next_ms = arb_app_step(world->app, now_ms);
-    const int32_t wait_ms = (int32_t)(next_ms - now_ms);
+    int32_t wait_ms;
+    int turns = 0;
+    do {
+        wait_ms = (int32_t)(arb_app_step(world->app, now_ms) - now_ms);
+        turns++;
+    } while (wait_ms <= 0 && turns < TURNS_MAX);
     const uint64_t tick_us = now_us - (now_us - world->start_us) % 1000u;
     world->app_next_us = wait_ms > 0 ? tick_us + (uint64_t)wait_ms * 1000u : tick_us + 1000u;
 }

@@ -15,23 +15,23 @@ static const pdcp_identity_t *owner_of(const profile_links_t *links, const profi
     return &links->parts[end->part].identity;
 }
 
-static bool part_is_used(const profile_links_t *links, uint8_t part)
+/* The part with this identity; PDCP_NONE: no entry names this device. *spare: a part that is free, PDCP_NONE:
+ * there is none; *unused: how many there are. */
+static uint8_t find_part(const profile_links_t *links, const pdcp_identity_t *identity, uint8_t *spare,
+                         uint8_t *unused)
 {
-    for (uint8_t i = 0; i < links->count; i++) {
-        if (links->entries[i].output.part == part || links->entries[i].input.part == part) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* The part with this identity; PDCP_NONE: no entry names this device. *unused: parts that are free. */
-static uint8_t find_part(const profile_links_t *links, const pdcp_identity_t *identity, uint8_t *unused)
-{
+    uint8_t used[(PROFILE_PARTS_MAX + 7) / 8];
     uint8_t found = PDCP_NONE;
+    memset(used, 0, sizeof used);
+    for (uint8_t i = 0; i < links->count; i++) {
+        profile_set_bit(used, links->entries[i].output.part, true);
+        profile_set_bit(used, links->entries[i].input.part, true);
+    }
+    *spare = PDCP_NONE;
     *unused = 0;
     for (uint8_t i = 0; i < PROFILE_PARTS_MAX; i++) {
-        if (!part_is_used(links, i)) {
+        if (!profile_bit(used, i)) {
+            *spare = i;
             ++*unused;
         } else if (pdcp_identity_equal(&links->parts[i].identity, identity)) {
             found = i;
@@ -42,22 +42,26 @@ static uint8_t find_part(const profile_links_t *links, const pdcp_identity_t *id
 
 static bool has_room(const profile_links_t *links, const profile_link_t *link)
 {
+    uint8_t spare;
     uint8_t unused;
-    const uint8_t needed = (uint8_t)((find_part(links, &link->output.owner, &unused) == PDCP_NONE ? 1 : 0) +
-                                     (find_part(links, &link->input.owner, &unused) == PDCP_NONE ? 1 : 0));
+    uint8_t needed = 0;
+    if (find_part(links, &link->output.owner, &spare, &unused) == PDCP_NONE) {
+        needed++;
+    }
+    if (find_part(links, &link->input.owner, &spare, &unused) == PDCP_NONE) {
+        needed++;
+    }
     return links->count < PROFILE_LINKS_MAX && needed <= unused;
 }
 
-/* Fills an end of an entry that counts already; there is room. */
+/* Fills an end of an entry; there is room. */
 static void put_end(profile_links_t *links, profile_ref_t *ref, const profile_end_t *end)
 {
+    uint8_t spare;
     uint8_t unused;
-    uint8_t part = find_part(links, &end->owner, &unused);
+    uint8_t part = find_part(links, &end->owner, &spare, &unused);
     if (part == PDCP_NONE) {
-        part = 0;
-        while (part_is_used(links, part)) {
-            part++;
-        }
+        part = spare;
     }
     links->parts[part].identity = end->owner;
     links->parts[part].type = end->owner_type;
@@ -110,12 +114,12 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
         }
         return false;
     }
-    profile_entry_t *entry = &links->entries[links->count++];
-    entry->output.part = PDCP_NONE;
-    entry->input.part = PDCP_NONE;
+    profile_entry_t *entry = &links->entries[links->count];
     entry->stand_in = PDCP_NONE;
     entry->by_host = by_host;
     put_end(links, &entry->input, &link->input);
+    entry->output.part = entry->input.part;
+    links->count++; /* the part counts as used */
     put_end(links, &entry->output, &link->output);
     sort_in(links);
     return true;
@@ -180,6 +184,12 @@ void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link
 {
     get_end(links, &links->entries[entry].output, &link->output);
     get_end(links, &links->entries[entry].input, &link->input);
+}
+
+bool profile_links_owns(const profile_links_t *links, const profile_ref_t *end, const pdcp_nodes_t *nodes,
+                        uint8_t place)
+{
+    return pdcp_identity_equal(owner_of(links, end), &nodes->nodes[place].identity);
 }
 
 uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end)

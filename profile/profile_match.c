@@ -79,3 +79,14 @@ bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transf
     return entry->node != PDCP_NONE && entry->transfer == transfer &&
            nodes->nodes[entry->node].state == PDCP_NODE_READY;
 }
+
+bool profile_bit(const uint8_t *bits, uint8_t number)
+{
+    return (bits[number / 8] & (1u << (number % 8))) != 0;
+}
+
+void profile_set_bit(uint8_t *bits, uint8_t number, bool value)
+{
+    const uint8_t mask = (uint8_t)(1u << (number % 8));
+    bits[number / 8] = (uint8_t)(value ? bits[number / 8] | mask : bits[number / 8] & ~mask);
+}

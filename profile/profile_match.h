@@ -32,4 +32,8 @@ int8_t profile_order(const pdcp_identity_t *a, const pdcp_identity_t *b);
 /* Is this channel on a device that is set up, and has it this direction (PDCP_INPUT, PDCP_OUTPUT)? */
 bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
 
+/* Sets of channels or places, a bit for each number. */
+bool profile_bit(const uint8_t *bits, uint8_t number);
+void profile_set_bit(uint8_t *bits, uint8_t number, bool value);
+
 #endif

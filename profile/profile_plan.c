@@ -16,54 +16,50 @@ typedef enum {
 /* What a new link needs, in this order. */
 typedef enum { NEED_BY_OUTPUT, NEED_BY_INPUT, DESIRED_BY_OUTPUT, DESIRED_BY_INPUT, NEEDS_END } need_t;
 
-/* One input that is being connected; the stack of them replaces recursion. */
-typedef struct {
-    uint8_t input;
-    uint8_t given;  /* SOURCE_GIVEN: the output */
-    uint8_t source; /* source_t: where the next candidate comes from */
-    uint8_t last;   /* source_t: the last one that may be asked */
-    uint8_t tried;  /* candidate of this source tried last, the one in the plan; PDCP_NONE: none yet */
-    uint8_t mark;   /* length of the log before its link was made */
-    uint8_t need;   /* need_t: what is seen to */
-    uint8_t cursor; /* channel number of the need seen to last, PDCP_NONE: none yet */
-    bool choosing;  /* its next candidate is to be tried */
-    bool required;  /* by the frame below */
-} frame_t;
+/* Where a plan is at. Each phase does one unit of its work at a time. */
+typedef enum {
+    PHASE_LOOK,     /* which links work */
+    PHASE_AWAITED,  /* which ends are awaited */
+    PHASE_ROUND,    /* a round begins */
+    PHASE_ORIGINAL, /* from here on in the order of a round */
+    PHASE_REPAIR,
+    PHASE_SETTLE,
+    PHASE_AUTO,
+    PHASE_ROUND_END,
+    PHASE_ORIGINAL_TAKE,  /* what an original replaces goes, */
+    PHASE_ORIGINAL_LINK,  /* it is linked, */
+    PHASE_ORIGINAL_JUDGE, /* and was that worth it? */
+    PHASE_REPAIR_CHOOSE,  /* the next entry is repaired: */
+    PHASE_REPAIR_INPUT,   /* an input stands in, */
+    PHASE_REPAIR_LINK,    /* and is linked */
+    PHASE_NAME,
+    PHASE_ENFORCE,
+    PHASE_FINISH,
+    PHASE_DONE
+} phase_t;
 
-/* Work space of one plan; lives on the stack while it is made. */
-enum { ROUNDS_MAX = 8 };
+enum {
+    ROUNDS_MAX = 8,
+    ALWAYS = 0x80,  /* beside profile_plan_what_t: in every plan */
+    NOT_YET = 0xFE, /* no channel has this number: the slice is over, the same is to be asked again */
+    /* Efforts. */
+    EFFORT_FIND = 8, /* to find an entry or the channel of an end */
+    EFFORT_SCAN = 24 /* to look for something among all entries or channels */
+};
 
-typedef struct {
-    profile_plan_t *plan;
-    const profile_scene_t *scene;
-    const pdcp_nodes_t *nodes;
-    uint8_t out[PROFILE_LINKS_MAX]; /* channel numbers of the entries' ends, PDCP_NONE: missing */
-    uint8_t in[PROFILE_LINKS_MAX];
-    uint8_t taken[PROFILE_CHANNEL_BYTES]; /* bit per output: it feeds a sole-access input */
-    uint8_t gone[PROFILE_CHANNEL_BYTES];  /* bit per input: it does not count as connected */
-    uint8_t log[PDCP_CHANNELS_MAX];       /* inputs connected, in order, for undoing */
-    uint8_t logged;
-    frame_t frames[PROFILE_PLAN_DEPTH];
-    uint8_t depth;
-    uint8_t needs_last; /* source_t: the last one that may be asked for what a link needs */
-    uint32_t steps_end; /* the search under way ends there */
-    bool waits;         /* an end of the configuration is awaited */
-} work_t;
-
-static bool get_bit(const uint8_t *bits, uint8_t number)
+static const pdcp_channel_t *channel_of(const profile_plan_t *plan, uint8_t channel)
 {
-    return (bits[number / 8] & (1u << (number % 8))) != 0;
+    return &plan->nodes->channels[channel];
 }
 
-static void set_bit(uint8_t *bits, uint8_t number, bool value)
+static profile_entry_t *entry_at(const profile_plan_t *plan, uint8_t number)
 {
-    const uint8_t mask = (uint8_t)(1u << (number % 8));
-    bits[number / 8] = (uint8_t)(value ? bits[number / 8] | mask : bits[number / 8] & ~mask);
+    return &plan->links->entries[number];
 }
 
-static const pdcp_channel_t *channel_of(const work_t *work, uint8_t channel)
+static bool is_ready(const profile_plan_t *plan, uint8_t channel, uint8_t transfer)
 {
-    return &work->nodes->channels[channel];
+    return profile_is_ready(plan->nodes, channel, transfer);
 }
 
 bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
@@ -74,43 +70,87 @@ bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
     }
     const pdcp_node_t *node = &scene->nodes->nodes[place];
     const bool coming = node->state == PDCP_NODE_SETUP && !node->setup_again;
-    return coming || (node->state == PDCP_NODE_LOST && get_bit(scene->awaited, place));
+    return coming || (node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place));
+}
+
+/* --- Ends of the configuration --- */
+
+/* The entry of an input, PDCP_NONE: it is nobody's. */
+static uint8_t entry_of(profile_plan_t *plan, uint8_t input)
+{
+    plan->left -= EFFORT_FIND;
+    return profile_links_of(plan->links, plan->nodes, input);
+}
+
+/* Channel numbers of an entry's ends, PDCP_NONE: missing. */
+static uint8_t output_of(profile_plan_t *plan, uint8_t entry)
+{
+    plan->left -= EFFORT_FIND;
+    return profile_links_channel(plan->links, plan->nodes, &entry_at(plan, entry)->output, PDCP_OUTPUT);
+}
+
+static uint8_t input_of(profile_plan_t *plan, uint8_t entry)
+{
+    plan->left -= EFFORT_FIND;
+    return profile_links_channel(plan->links, plan->nodes, &entry_at(plan, entry)->input, PDCP_INPUT);
+}
+
+/* Is this input linked to the output that an entry names? */
+static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t entry)
+{
+    const uint8_t output = plan->want[input];
+    if (output == PDCP_NONE) {
+        return false;
+    }
+    const profile_ref_t *end = &entry_at(plan, entry)->output;
+    const pdcp_channel_t *channel = channel_of(plan, output);
+    return channel->index == end->index && profile_links_owns(plan->links, end, plan->nodes, channel->node);
 }
 
 /* --- Links of the plan --- */
 
 /* The sole-access input, other than this one, that an output feeds; PDCP_NONE: none. */
-static uint8_t sole_input(const work_t *work, uint8_t output, uint8_t other_than)
+static uint8_t sole_input(const profile_plan_t *plan, uint8_t output, uint8_t other_than)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (work->plan->want[i] == output && i != other_than && profile_is_sole(channel_of(work, i))) {
+        if (plan->want[i] == output && i != other_than && profile_is_sole(channel_of(plan, i))) {
             return i;
         }
     }
     return PDCP_NONE;
 }
 
-static void link_input(work_t *work, uint8_t input, uint8_t output)
+static void link_input(profile_plan_t *plan, uint8_t input, uint8_t output)
 {
-    work->plan->want[input] = output;
-    if (profile_is_sole(channel_of(work, input))) {
-        set_bit(work->taken, output, true);
+    plan->want[input] = output;
+    if (profile_is_sole(channel_of(plan, input))) {
+        profile_set_bit(plan->taken, output, true);
     }
 }
 
-static void unlink_input(work_t *work, uint8_t input)
+static void unlink_input(profile_plan_t *plan, uint8_t input)
 {
-    const uint8_t output = work->plan->want[input];
-    work->plan->want[input] = PDCP_NONE;
-    if (output != PDCP_NONE) {
-        set_bit(work->taken, output, sole_input(work, output, input) != PDCP_NONE);
+    const uint8_t output = plan->want[input];
+    plan->want[input] = PDCP_NONE;
+    if (output != PDCP_NONE && profile_is_sole(channel_of(plan, input))) {
+        plan->left -= EFFORT_SCAN;
+        profile_set_bit(plan->taken, output, sole_input(plan, output, input) != PDCP_NONE);
     }
 }
 
-static bool is_banned(const work_t *work, uint8_t output, uint8_t input)
+/* What was taken away comes back. */
+static void give_back(profile_plan_t *plan, uint8_t input, uint8_t output)
 {
-    for (uint8_t i = 0; i < work->scene->banned_count; i++) {
-        if (work->scene->banned[i].output == output && work->scene->banned[i].input == input) {
+    if (input != PDCP_NONE && output != PDCP_NONE) {
+        link_input(plan, input, output);
+    }
+}
+
+static bool is_banned(const profile_plan_t *plan, uint8_t output, uint8_t input)
+{
+    const profile_pair_t *banned = plan->scene->banned;
+    for (uint8_t i = plan->scene->banned_count; i > 0; i--, banned++) {
+        if (banned->output == output && banned->input == input) {
             return true;
         }
     }
@@ -119,120 +159,157 @@ static bool is_banned(const work_t *work, uint8_t output, uint8_t input)
 
 /* May this output feed this input? Both are set up and unbanned, of different devices, and sole access is
  * respected [PROFILE listing 4.4]. */
-static bool may_link(const work_t *work, uint8_t output, uint8_t input)
+static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
 {
-    return profile_is_ready(work->nodes, output, PDCP_OUTPUT) &&
-           profile_is_ready(work->nodes, input, PDCP_INPUT) &&
-           channel_of(work, output)->node != channel_of(work, input)->node &&
-           !is_banned(work, output, input) &&
-           !(get_bit(work->taken, output) && profile_is_sole(channel_of(work, input)));
+    return is_ready(plan, output, PDCP_OUTPUT) && is_ready(plan, input, PDCP_INPUT) &&
+           channel_of(plan, output)->node != channel_of(plan, input)->node &&
+           !is_banned(plan, output, input) &&
+           !(profile_bit(plan->taken, output) && profile_is_sole(channel_of(plan, input)));
 }
 
 /* --- Candidates --- */
 
-/* What candidates are compared with. */
+/* What candidates are compared with, and at the other end of the link. */
 typedef struct {
     uint16_t type;
     uint16_t profile;
+    uint8_t transfer; /* direction of the candidates */
+    uint8_t partner;
 } model_t;
 
-static uint8_t score_of(const work_t *work, uint8_t channel, const model_t *model)
+static uint8_t score_of(const profile_plan_t *plan, uint8_t channel, uint16_t type, uint16_t profile)
 {
-    return profile_similarity(channel_of(work, channel)->type, channel_of(work, channel)->profile,
-                              model->type, model->profile);
+    return profile_similarity(channel_of(plan, channel)->type, channel_of(plan, channel)->profile, type,
+                              profile);
 }
 
 /* May this input take the place of a missing one? It must be nobody's. */
-static bool is_spare(const work_t *work, uint8_t input)
+static bool is_spare(profile_plan_t *plan, uint8_t input)
 {
-    if (work->plan->want[input] != PDCP_NONE) {
+    if (plan->want[input] != PDCP_NONE) {
         return false;
     }
-    const uint8_t entry = profile_links_of(work->scene->links, work->nodes, input);
-    return entry == PDCP_NONE || (work->out[entry] == PDCP_NONE && !work->waits);
+    const uint8_t entry = entry_of(plan, input);
+    return entry == PDCP_NONE || (!plan->waits && output_of(plan, entry) == PDCP_NONE);
 }
 
-/* May a channel with this direction be linked to the partner at the other end? */
-static bool is_candidate(const work_t *work, uint8_t channel, uint8_t transfer, uint8_t partner)
+/* May a channel be linked to the partner at the other end? */
+static bool is_candidate(profile_plan_t *plan, const model_t *model, uint8_t channel)
 {
-    if (transfer == PDCP_OUTPUT) {
-        return may_link(work, channel, partner);
+    if (model->transfer == PDCP_OUTPUT) {
+        return may_link(plan, channel, model->partner);
     }
-    return may_link(work, partner, channel) && is_spare(work, channel);
+    return may_link(plan, model->partner, channel) && is_spare(plan, channel);
 }
 
-static void begin_search(work_t *work)
+static void begin_search(profile_plan_t *plan)
 {
-    const uint32_t left = (uint32_t)PROFILE_PLAN_STEPS - work->plan->steps;
-    work->steps_end = work->plan->steps + left / PROFILE_PLAN_SHARE;
+    plan->search_left = (uint16_t)((PROFILE_PLAN_STEPS - plan->steps) / PROFILE_PLAN_SHARE);
+    plan->search_at = 0;
 }
 
-static bool may_search(const work_t *work)
+/* Is a channel with this score the best one so far? */
+static void compare(profile_plan_t *plan, uint8_t channel, uint8_t score)
 {
-    return work->plan->steps + PDCP_CHANNELS_MAX <= work->steps_end;
+    if (score > plan->best_score ||
+        (score == plan->best_score &&
+         (plan->best == PDCP_NONE || profile_is_before(plan->nodes, channel, plan->best)))) {
+        plan->best = channel;
+        plan->best_score = score;
+    }
+}
+
+/* A search goes on at search_at, where it begins if that is 0. It looks at one channel at least, however
+ * short the slice. */
+static void go_on_searching(profile_plan_t *plan)
+{
+    if (plan->search_at == 0) {
+        plan->best = PDCP_NONE;
+        plan->best_score = PROFILE_CANDIDATE_MIN;
+    }
+}
+
+/* Goes to the next channel. False: there are no more, or the slice is over. */
+static bool next_channel(profile_plan_t *plan)
+{
+    plan->left--;
+    plan->search_at++;
+    return plan->search_at < PDCP_CHANNELS_MAX && plan->left > 0;
+}
+
+static uint8_t found(profile_plan_t *plan)
+{
+    if (plan->search_at < PDCP_CHANNELS_MAX) {
+        return NOT_YET;
+    }
+    plan->search_at = 0;
+    return plan->best;
 }
 
 /* The channel that comes next behind `tried` in the order of likeness to the model, among those that may be
  * linked to the partner. PDCP_NONE: there are no more. */
-static uint8_t next_candidate(work_t *work, const model_t *model, uint8_t transfer, uint8_t partner,
-                              uint8_t tried)
+static uint8_t next_candidate(profile_plan_t *plan, const model_t *model, uint8_t tried)
 {
-    uint8_t best = PDCP_NONE;
-    uint8_t best_score = PROFILE_CANDIDATE_MIN;
-    const uint8_t tried_score = tried != PDCP_NONE ? score_of(work, tried, model) : UINT8_MAX;
-    if (!may_search(work)) {
-        return PDCP_NONE;
-    }
-    for (uint8_t c = 0; c < PDCP_CHANNELS_MAX; c++) {
-        work->plan->steps++;
-        if (!is_candidate(work, c, transfer, partner)) {
-            continue;
+    const uint8_t tried_score =
+        tried != PDCP_NONE ? score_of(plan, tried, model->type, model->profile) : UINT8_MAX;
+    go_on_searching(plan);
+    if (plan->search_at == 0) {
+        if (plan->search_left < PDCP_CHANNELS_MAX) {
+            return PDCP_NONE;
         }
-        const uint8_t score = score_of(work, c, model);
-        const bool behind =
-            score < tried_score || (score == tried_score && profile_is_before(work->nodes, tried, c));
-        const bool better =
-            score > best_score ||
-            (score == best_score && (best == PDCP_NONE || profile_is_before(work->nodes, c, best)));
-        if (behind && better) {
-            best = c;
-            best_score = score;
-        }
+        plan->search_left = (uint16_t)(plan->search_left - PDCP_CHANNELS_MAX);
+        plan->steps += PDCP_CHANNELS_MAX;
     }
-    return best;
+    do {
+        const uint8_t c = plan->search_at;
+        if (is_candidate(plan, model, c)) {
+            const uint8_t score = score_of(plan, c, model->type, model->profile);
+            plan->left -= 4;
+            if (score < tried_score || (score == tried_score && profile_is_before(plan->nodes, tried, c))) {
+                compare(plan, c, score);
+            }
+        }
+    } while (next_channel(plan));
+    return found(plan);
 }
 
-static uint8_t next_of_source(work_t *work, const frame_t *frame, uint8_t entry)
+/* The next candidate of the kind of source that a frame is at. */
+static uint8_t next_of_source(profile_plan_t *plan, const profile_frame_t *frame, uint8_t entry)
 {
-    const uint8_t original = entry != PDCP_NONE ? work->out[entry] : PDCP_NONE;
-    model_t model = {channel_of(work, frame->input)->type, channel_of(work, frame->input)->profile};
-    if (frame->source == SOURCE_GIVEN || frame->source == SOURCE_ORIGINAL) {
-        const uint8_t output = frame->source == SOURCE_GIVEN ? frame->given : original;
-        const bool is_new = frame->tried == PDCP_NONE;
-        return is_new && may_link(work, output, frame->input) ? output : PDCP_NONE;
-    }
-    if (frame->source == SOURCE_REPLACEMENT) {
+    const pdcp_channel_t *input = channel_of(plan, frame->input);
+    model_t model = {input->type, input->profile, PDCP_OUTPUT, frame->input};
+    if (frame->source != SOURCE_SIMILAR) {
+        const uint8_t original = entry != PDCP_NONE ? output_of(plan, entry) : PDCP_NONE;
+        if (frame->source != SOURCE_REPLACEMENT) {
+            const uint8_t output = frame->source == SOURCE_GIVEN ? plan->given : original;
+            return frame->tried == PDCP_NONE && may_link(plan, output, frame->input) ? output : PDCP_NONE;
+        }
         if (entry == PDCP_NONE || original != PDCP_NONE) {
             return PDCP_NONE;
         }
-        const profile_ref_t *missing = &work->scene->links->entries[entry].output;
-        model.type = missing->type;
-        model.profile = missing->profile;
+        model.type = entry_at(plan, entry)->output.type;
+        model.profile = entry_at(plan, entry)->output.profile;
     }
-    return next_candidate(work, &model, PDCP_OUTPUT, frame->input, frame->tried);
+    return next_candidate(plan, &model, frame->tried);
 }
 
-/* The next output to try for the input of a frame; PDCP_NONE: none is left. */
-static uint8_t next_source(work_t *work, frame_t *frame)
+/* The next output to try for the input of the top frame; PDCP_NONE: none is left. */
+static uint8_t next_source(profile_plan_t *plan)
 {
-    const uint8_t entry = profile_links_of(work->scene->links, work->nodes, frame->input);
-    if (entry != PDCP_NONE && profile_is_awaited(work->scene, &work->scene->links->entries[entry].output)) {
+    profile_frame_t *frame = &plan->top;
+    const uint8_t last = plan->depth == 0 ? frame->source : plan->needs_last;
+    const uint8_t entry = entry_of(plan, frame->input);
+    if (entry != PDCP_NONE && profile_is_awaited(plan->scene, &entry_at(plan, entry)->output)) {
         return PDCP_NONE; /* its source will be back in a moment */
     }
-    for (; frame->source <= frame->last; frame->source++) {
-        frame->tried = next_of_source(work, frame, entry);
-        if (frame->tried != PDCP_NONE) {
-            return frame->tried;
+    for (; frame->source <= last; frame->source++) {
+        const uint8_t output = next_of_source(plan, frame, entry);
+        if (output == NOT_YET) {
+            return NOT_YET;
+        }
+        frame->tried = output;
+        if (output != PDCP_NONE) {
+            return output;
         }
     }
     return PDCP_NONE;
@@ -240,45 +317,80 @@ static uint8_t next_source(work_t *work, frame_t *frame)
 
 /* --- Intelligently connect [PROFILE listing 4.5] --- */
 
-static void push(work_t *work, uint8_t input, source_t first, source_t last)
+/* An input is to be connected, on top of the others; the stack of frames replaces recursion. */
+static void push(profile_plan_t *plan, uint8_t input, source_t first)
 {
-    frame_t *frame = &work->frames[work->depth++];
-    memset(frame, 0, sizeof *frame);
-    frame->input = input;
-    frame->given = PDCP_NONE;
-    frame->source = (uint8_t)first;
-    frame->last = (uint8_t)last;
-    frame->tried = PDCP_NONE;
-    frame->choosing = true;
+    plan->search_at = 0;
+    plan->top.input = input;
+    plan->top.source = (uint8_t)first;
+    plan->top.tried = PDCP_NONE;
+    plan->top.mark = plan->logged;
+    plan->top.choosing = true;
 }
 
-static void undo_to(work_t *work, uint8_t mark)
+/* Of a frame below the top, only what cannot be found elsewhere is kept. */
+static void descend(profile_plan_t *plan, uint8_t need)
 {
-    while (work->logged > mark) {
-        unlink_input(work, work->log[--work->logged]);
+    profile_frame_t *top = &plan->top;
+    const uint8_t kept = (uint8_t)(top->source << 2 | top->need);
+    uint8_t *below = &plan->below[plan->depth / 2];
+    *below = (uint8_t)(plan->depth % 2 == 0 ? kept : (*below & 0xFu) | (unsigned)kept << 4);
+    plan->depth++;
+    profile_set_bit(plan->open, top->mark, true);
+    push(plan, need, SOURCE_ORIGINAL);
+}
+
+/* The top frame is done: back to the one below. False: there is none. */
+static bool ascend(profile_plan_t *plan)
+{
+    profile_frame_t *top = &plan->top;
+    if (plan->depth == 0) {
+        plan->connecting = false;
+        return false;
+    }
+    plan->depth--;
+    const uint8_t both = plan->below[plan->depth / 2];
+    const uint8_t kept = plan->depth % 2 == 0 ? both & 0xFu : both >> 4;
+    do {
+        top->mark--;
+    } while (!profile_bit(plan->open, top->mark));
+    profile_set_bit(plan->open, top->mark, false);
+    top->cursor = top->input;
+    top->input = plan->log[top->mark];
+    top->tried = plan->want[top->input];
+    top->source = (uint8_t)(kept >> 2);
+    top->need = kept & 3u;
+    top->choosing = false;
+    return true;
+}
+
+static void undo_to(profile_plan_t *plan, uint8_t mark)
+{
+    while (plan->logged > mark) {
+        unlink_input(plan, plan->log[--plan->logged]);
     }
 }
 
-static bool is_connected(const work_t *work, uint8_t input)
+static bool is_connected(const profile_plan_t *plan, uint8_t input)
 {
-    return work->plan->want[input] != PDCP_NONE && !get_bit(work->gone, input);
+    return plan->want[input] != PDCP_NONE && !(plan->finding && profile_bit(plan->of.bits.gone, input));
 }
 
 /* The next unconnected input that the link of a frame requires or desires, required ones first; PDCP_NONE:
  * there are no more. */
-static uint8_t next_need(const work_t *work, frame_t *frame)
+static uint8_t next_need(profile_plan_t *plan, profile_frame_t *frame, need_t end)
 {
-    for (; frame->need < NEEDS_END; frame->need++, frame->cursor = PDCP_NONE) {
-        const bool by_output = frame->need == NEED_BY_OUTPUT || frame->need == DESIRED_BY_OUTPUT;
-        const uint8_t by = by_output ? frame->tried : frame->input;
-        const pdcp_node_t *owner = &work->nodes->nodes[channel_of(work, by)->node];
+    for (; frame->need < end; frame->need++, frame->cursor = PDCP_NONE) {
+        const uint8_t by = frame->need % 2 == NEED_BY_OUTPUT ? frame->tried : frame->input;
+        const pdcp_node_t *owner = &plan->nodes->nodes[channel_of(plan, by)->node];
         if (owner->needs_stride == 0) {
             continue;
         }
-        uint8_t c = frame->cursor != PDCP_NONE ? channel_of(work, frame->cursor)->next : owner->first_channel;
-        for (; c != PDCP_NONE; c = channel_of(work, c)->next) {
-            if (!is_connected(work, c) && pdcp_nodes_needs(work->nodes, by, frame->need >= DESIRED_BY_OUTPUT,
-                                                           channel_of(work, c)->index)) {
+        uint8_t c = frame->cursor != PDCP_NONE ? channel_of(plan, frame->cursor)->next : owner->first_channel;
+        for (; c != PDCP_NONE; c = channel_of(plan, c)->next) {
+            plan->left--;
+            if (!is_connected(plan, c) && pdcp_nodes_needs(plan->nodes, by, frame->need >= DESIRED_BY_OUTPUT,
+                                                           channel_of(plan, c)->index)) {
                 frame->cursor = c;
                 return c;
             }
@@ -287,495 +399,677 @@ static uint8_t next_need(const work_t *work, frame_t *frame)
     return PDCP_NONE;
 }
 
-/* The link of a frame does not hold: all that was made for it is undone, its next candidate is due. */
-static void reject(work_t *work, frame_t *frame)
+/* The link of the top frame does not hold: all that was made for it is undone, its next candidate is due. */
+static void reject(profile_plan_t *plan)
 {
-    undo_to(work, frame->mark);
-    frame->choosing = true;
+    undo_to(plan, plan->top.mark);
+    plan->search_at = 0;
+    plan->top.choosing = true;
 }
 
-/* Gives the input of a frame its next candidate. False: there is none. */
-static bool choose(work_t *work, frame_t *frame)
+/* Gives the input of the top frame its next candidate. */
+static void choose(profile_plan_t *plan)
 {
-    const uint8_t output = next_source(work, frame);
+    profile_frame_t *top = &plan->top;
+    const uint8_t output = next_source(plan);
     if (output == PDCP_NONE) {
-        return false;
+        if (ascend(plan) && top->need < DESIRED_BY_OUTPUT) {
+            reject(plan);
+        }
+    } else if (output != NOT_YET) {
+        top->choosing = false;
+        top->need = NEED_BY_OUTPUT;
+        top->cursor = PDCP_NONE;
+        link_input(plan, top->input, output);
+        plan->log[plan->logged++] = top->input;
     }
-    frame->choosing = false;
-    frame->mark = work->logged;
-    frame->need = NEED_BY_OUTPUT;
-    frame->cursor = PDCP_NONE;
-    link_input(work, frame->input, output);
-    work->log[work->logged++] = frame->input;
-    return true;
 }
 
-/* Goes on with the top frame of the stack. */
-static void advance(work_t *work)
+/* Goes on with the top frame. */
+static void advance(profile_plan_t *plan)
 {
-    frame_t *frame = &work->frames[work->depth - 1];
-    if (frame->choosing && !choose(work, frame)) {
-        work->depth--;
-        if (frame->required && work->depth != 0) {
-            reject(work, &work->frames[work->depth - 1]);
-        }
+    profile_frame_t *top = &plan->top;
+    if (top->choosing) {
+        choose(plan);
         return;
     }
-    const uint8_t need = next_need(work, frame);
-    const bool required = frame->need < DESIRED_BY_OUTPUT;
+    const uint8_t need = next_need(plan, top, NEEDS_END);
     if (need == PDCP_NONE) {
-        work->depth--; /* the link holds */
-    } else if (work->depth < PROFILE_PLAN_DEPTH) {
-        push(work, need, SOURCE_ORIGINAL, (source_t)work->needs_last);
-        work->frames[work->depth - 1].required = required;
-    } else if (required) {
-        reject(work, frame); /* too deep */
+        (void)ascend(plan); /* the link holds */
+    } else if (plan->depth < PROFILE_PLAN_DEPTH - 1) {
+        descend(plan, need);
+    } else if (top->need < DESIRED_BY_OUTPUT) {
+        reject(plan); /* too deep */
     }
 }
 
 /* Connects an input and all that its link requires, and of what it desires as much as can be. Loops end: an
- * input that is being connected counts as connected. False: nothing has changed. given: for SOURCE_GIVEN. */
-static bool connect_input(work_t *work, uint8_t input, uint8_t given, source_t first, source_t last)
+ * input that is being connected counts as connected. If it cannot be, nothing has changed when the phase goes
+ * on. given: for SOURCE_GIVEN. */
+static void connect(profile_plan_t *plan, uint8_t input, uint8_t given, source_t source)
 {
-    work->depth = 0;
-    work->logged = 0;
-    begin_search(work);
-    push(work, input, first, last);
-    work->frames[0].given = given;
-    while (work->depth != 0) {
-        advance(work);
-    }
-    return work->plan->want[input] != PDCP_NONE;
+    plan->connecting = true;
+    plan->depth = 0;
+    plan->logged = 0;
+    plan->given = given;
+    plan->needs_last = SOURCE_SIMILAR;
+    begin_search(plan);
+    push(plan, input, source);
 }
 
 /* --- What links require --- */
 
-static bool is_left_alone(const work_t *work, uint8_t input)
+static bool is_left_alone(profile_plan_t *plan, uint8_t input)
 {
-    const uint8_t entry = profile_links_of(work->scene->links, work->nodes, input);
-    return entry != PDCP_NONE && work->scene->links->entries[entry].by_host &&
-           work->out[entry] == work->plan->want[input];
+    const uint8_t entry = entry_of(plan, input);
+    return entry != PDCP_NONE && entry_at(plan, entry)->by_host && hears_output_of(plan, input, entry);
 }
 
-static bool lacks_need(const work_t *work, uint8_t input)
+/* Does the link of this input lack something that it requires, which takes it away? */
+static bool is_lacking(profile_plan_t *plan, uint8_t input)
 {
-    frame_t frame = {.input = input, .tried = work->plan->want[input], .cursor = PDCP_NONE};
-    return next_need(work, &frame) != PDCP_NONE && frame.need < DESIRED_BY_OUTPUT;
+    profile_frame_t frame = {.input = input, .tried = plan->want[input], .cursor = PDCP_NONE};
+    return is_connected(plan, input) && next_need(plan, &frame, DESIRED_BY_OUTPUT) != PDCP_NONE &&
+           !is_left_alone(plan, input);
 }
 
-/* Marks as gone the links that lack something they require, and those that require one of these. */
-static void find_gone(work_t *work)
+/* Goes to the next entry or input of a phase. True: it was the last one, from the first one again. */
+static bool was_last(profile_plan_t *plan, uint8_t count)
 {
-    bool changed = true;
-    while (changed) {
-        changed = false;
-        for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-            if (is_connected(work, i) && lacks_need(work, i) && !is_left_alone(work, i)) {
-                set_bit(work->gone, i, true);
-                changed = true;
-            }
-        }
+    plan->at++;
+    if (plan->at < count) {
+        return false;
     }
+    plan->at = 0;
+    return true;
+}
+
+/* Begins to mark as gone the links that lack something they require, and those that require one of these. The
+ * phase then goes on. */
+static void find_gone(profile_plan_t *plan)
+{
+    memset(plan->of.bits.gone, 0, sizeof plan->of.bits.gone);
+    plan->finding = true;
+    plan->changed = false;
+    plan->input_at = 0;
+}
+
+/* One input more, until nothing changes. */
+static void find_next(profile_plan_t *plan)
+{
+    const uint8_t input = plan->input_at;
+    if (is_lacking(plan, input)) {
+        profile_set_bit(plan->of.bits.gone, input, true);
+        plan->changed = true;
+    }
+    plan->input_at++;
+    if (plan->input_at == PDCP_CHANNELS_MAX) {
+        plan->finding = plan->changed;
+        plan->changed = false;
+        plan->input_at = 0;
+    }
+}
+
+/* Goes to the part of a round that comes behind this one, of those that are to be planned. */
+static void go_on(profile_plan_t *plan, phase_t done)
+{
+    static const uint8_t whats[] = {[PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
+                                    [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,
+                                    [PHASE_SETTLE] = ALWAYS,
+                                    [PHASE_AUTO] = PROFILE_PLAN_AUTO,
+                                    [PHASE_ROUND_END] = ALWAYS};
+    uint8_t phase = (uint8_t)done;
+    do {
+        phase++;
+    } while ((plan->what & whats[phase]) == 0);
+    plan->phase = phase;
+    plan->at = 0;
+    plan->pass = 0;
+    plan->changed = false;
+    plan->input = PDCP_NONE;
+    plan->search_at = 0;
 }
 
 /* --- Originals [PROFILE listing 4.3], D-PRO-6 --- */
 
 /* Does this input stand in for a missing one? */
-static bool stands_in(const work_t *work, uint8_t input)
+static bool stands_in(profile_plan_t *plan, uint8_t input)
 {
-    for (uint8_t e = 0; e < work->scene->links->count; e++) {
-        if (work->scene->links->entries[e].stand_in == input) {
-            return true;
-        }
-    }
-    return false;
+    plan->left -= EFFORT_FIND;
+    return memchr(plan->stand_in, input, plan->links->count) != NULL;
 }
 
 /* Does the source of this input only stand in: for the one that the configuration names, or the input itself
  * for another? */
-static bool is_standing_in(const work_t *work, uint8_t input)
+static bool is_standing_in(profile_plan_t *plan, uint8_t input)
 {
-    const profile_links_t *links = work->scene->links;
-    const uint8_t own = profile_links_of(links, work->nodes, input);
-    if (own != PDCP_NONE) {
-        return work->out[own] != work->plan->want[input];
-    }
-    return stands_in(work, input);
+    const uint8_t own = entry_of(plan, input);
+    return own != PDCP_NONE ? !hears_output_of(plan, input, own) : stands_in(plan, input);
 }
 
 /* Inputs that do not stand in any more. */
-static void forget_stand_ins(const work_t *work)
+static void forget_stand_ins(profile_plan_t *plan)
 {
-    for (uint8_t e = 0; e < work->scene->links->count; e++) {
-        profile_entry_t *entry = &work->scene->links->entries[e];
-        if (entry->stand_in != PDCP_NONE &&
-            (work->out[e] == PDCP_NONE || work->plan->want[entry->stand_in] != work->out[e])) {
-            entry->stand_in = PDCP_NONE;
+    for (uint8_t e = 0; e < plan->links->count; e++) {
+        const uint8_t input = plan->stand_in[e];
+        if (input != PDCP_NONE && !hears_output_of(plan, input, e)) {
+            plan->stand_in[e] = PDCP_NONE;
         }
     }
+    plan->left -= EFFORT_SCAN;
 }
 
-/* What an original has to replace before it can come back; PDCP_NONE: nothing. */
-typedef struct {
-    uint8_t input;
-    uint8_t output;
-} replaced_t;
-
-static replaced_t take_away(work_t *work, uint8_t input)
+/* Is this entry's turn in this pass, terminal ones last, and is there something to bring back? */
+static bool is_due(profile_plan_t *plan, uint8_t number)
 {
-    const replaced_t replaced = {input, input != PDCP_NONE ? work->plan->want[input] : PDCP_NONE};
-    if (replaced.output != PDCP_NONE) {
-        unlink_input(work, input);
+    plan->input = input_of(plan, number);
+    plan->output = output_of(plan, number);
+    return plan->input != PDCP_NONE && plan->output != PDCP_NONE &&
+           profile_is_terminal(channel_of(plan, plan->input)) == (plan->pass == 1) &&
+           (plan->want[plan->input] != plan->output || plan->stand_in[number] != PDCP_NONE);
+}
+
+static void next_original(profile_plan_t *plan)
+{
+    plan->phase = PHASE_ORIGINAL;
+    if (was_last(plan, plan->links->count)) {
+        plan->pass++;
     }
-    return replaced;
-}
-
-static void give_back(work_t *work, const replaced_t *replaced)
-{
-    if (replaced->output != PDCP_NONE) {
-        link_input(work, replaced->input, replaced->output);
-    }
-}
-
-/* What a terminal one needs is searched for; another one must find it connected, or in other originals. What
- * the host has made needs nothing (D-PRO-9). */
-static bool link_original(work_t *work, uint8_t number)
-{
-    const uint8_t input = work->in[number];
-    const uint8_t output = work->out[number];
-    work->needs_last = profile_is_terminal(channel_of(work, input)) ? SOURCE_SIMILAR : SOURCE_ORIGINAL;
-    bool linked = connect_input(work, input, output, SOURCE_GIVEN, SOURCE_GIVEN);
-    work->needs_last = SOURCE_SIMILAR;
-    if (!linked && work->scene->links->entries[number].by_host && may_link(work, output, input)) {
-        link_input(work, input, output);
-        work->log[work->logged++] = input;
-        linked = true;
-    }
-    return linked;
-}
-
-static bool is_original(const work_t *work, uint8_t input)
-{
-    const uint8_t own = profile_links_of(work->scene->links, work->nodes, input);
-    return own != PDCP_NONE && work->plan->want[input] != PDCP_NONE &&
-           work->out[own] == work->plan->want[input];
-}
-
-/* Has the link of this input all that it requires, and has no original lost that which it had? lacking:
- * inputs whose links were lacking something before. */
-static bool is_worth_it(work_t *work, uint8_t input, const uint8_t *lacking)
-{
-    find_gone(work);
-    bool good = !get_bit(work->gone, input);
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        good = good && !(get_bit(work->gone, i) && !get_bit(lacking, i) && is_original(work, i));
-    }
-    memset(work->gone, 0, sizeof work->gone);
-    return good;
 }
 
 /* Makes a link of the configuration whose ends are both there; what stood in for them goes. */
-static void bring_back(work_t *work, uint8_t number)
+static void bring_back(profile_plan_t *plan)
 {
-    profile_entry_t *entry = &work->scene->links->entries[number];
-    const uint8_t input = work->in[number];
-    const uint8_t output = work->out[number];
-    uint8_t lacking[PROFILE_CHANNEL_BYTES];
-    forget_stand_ins(work);
-    const uint8_t other =
-        profile_is_sole(channel_of(work, input)) ? sole_input(work, output, input) : PDCP_NONE;
-    const bool takes = other != PDCP_NONE && other != entry->stand_in && is_standing_in(work, other);
-    const bool costs = work->plan->want[input] != PDCP_NONE || entry->stand_in != PDCP_NONE || takes;
-    if (costs) {
-        find_gone(work);
-        memcpy(lacking, work->gone, sizeof lacking);
-        memset(work->gone, 0, sizeof work->gone);
-    }
-    const replaced_t source = take_away(work, input);
-    const replaced_t stand_in = take_away(work, entry->stand_in);
-    const replaced_t rival = take_away(work, takes ? other : PDCP_NONE);
-    const bool linked = link_original(work, number);
-    if (linked && (!costs || is_worth_it(work, input, lacking))) {
-        entry->stand_in = PDCP_NONE;
+    if (plan->pass == 2 || plan->links->count == 0) {
+        go_on(plan, PHASE_ORIGINAL);
         return;
     }
-    undo_to(work, 0);
-    give_back(work, &rival);
-    give_back(work, &stand_in);
-    give_back(work, &source);
+    if (!is_due(plan, plan->at)) {
+        next_original(plan);
+        return;
+    }
+    forget_stand_ins(plan);
+    const uint8_t stand_in = plan->stand_in[plan->at];
+    const uint8_t other = profile_is_sole(channel_of(plan, plan->input))
+                              ? sole_input(plan, plan->output, plan->input)
+                              : PDCP_NONE;
+    const bool takes = other != PDCP_NONE && other != stand_in && is_standing_in(plan, other);
+    plan->rival = takes ? other : PDCP_NONE;
+    plan->costs = takes || plan->want[plan->input] != PDCP_NONE || stand_in != PDCP_NONE;
+    plan->phase = PHASE_ORIGINAL_TAKE;
+    if (plan->costs) {
+        find_gone(plan);
+    }
 }
 
-static void bring_back_all(work_t *work)
+static void take_away(profile_plan_t *plan, uint8_t input)
 {
-    const profile_links_t *links = work->scene->links;
-    for (uint8_t pass = 0; pass < 2; pass++) { /* terminal ones last */
-        for (uint8_t e = 0; e < links->count; e++) {
-            if (work->in[e] != PDCP_NONE && work->out[e] != PDCP_NONE &&
-                profile_is_terminal(channel_of(work, work->in[e])) == (pass == 1) &&
-                (work->plan->want[work->in[e]] != work->out[e] || links->entries[e].stand_in != PDCP_NONE)) {
-                bring_back(work, e);
-            }
-        }
+    if (input != PDCP_NONE) {
+        unlink_input(plan, input);
+    }
+}
+
+/* What a terminal one needs is searched for; another one must find it connected, or in other originals. */
+static void take_for_original(profile_plan_t *plan)
+{
+    memcpy(plan->of.bits.lacking, plan->of.bits.gone, sizeof plan->of.bits.lacking);
+    plan->source = plan->want[plan->input];
+    take_away(plan, plan->input);
+    take_away(plan, plan->stand_in[plan->at]);
+    take_away(plan, plan->rival);
+    connect(plan, plan->input, plan->output, SOURCE_GIVEN);
+    if (!profile_is_terminal(channel_of(plan, plan->input))) {
+        plan->needs_last = SOURCE_ORIGINAL;
+    }
+    plan->phase = PHASE_ORIGINAL_LINK;
+}
+
+static void keep_original(profile_plan_t *plan)
+{
+    plan->stand_in[plan->at] = PDCP_NONE;
+    next_original(plan);
+}
+
+static void give_up_original(profile_plan_t *plan)
+{
+    undo_to(plan, 0);
+    give_back(plan, plan->rival, plan->output);
+    give_back(plan, plan->stand_in[plan->at], plan->output);
+    give_back(plan, plan->input, plan->source);
+    next_original(plan);
+}
+
+/* What the host has made needs nothing (D-PRO-9). */
+static void link_original(profile_plan_t *plan)
+{
+    const uint8_t input = plan->input;
+    if (plan->want[input] == PDCP_NONE && entry_at(plan, plan->at)->by_host &&
+        may_link(plan, plan->output, input)) {
+        link_input(plan, input, plan->output);
+        plan->log[plan->logged++] = input;
+    }
+    if (plan->want[input] == PDCP_NONE) {
+        give_up_original(plan);
+    } else if (plan->costs) {
+        plan->phase = PHASE_ORIGINAL_JUDGE;
+        find_gone(plan);
+    } else {
+        keep_original(plan);
+    }
+}
+
+static bool is_original(profile_plan_t *plan, uint8_t input)
+{
+    const uint8_t own = entry_of(plan, input);
+    return own != PDCP_NONE && hears_output_of(plan, input, own);
+}
+
+/* Has the link all that it requires, and has no original lost that which it had? */
+static void judge_original(profile_plan_t *plan)
+{
+    bool good = !profile_bit(plan->of.bits.gone, plan->input);
+    for (uint8_t i = 0; good && i < PDCP_CHANNELS_MAX; i++) {
+        good = !profile_bit(plan->of.bits.gone, i) || profile_bit(plan->of.bits.lacking, i) ||
+               !is_original(plan, i);
+    }
+    if (good) {
+        keep_original(plan);
+    } else {
+        give_up_original(plan);
     }
 }
 
 /* --- Replacements [PROFILE listing 4.6] --- */
 
-static uint8_t replacement_of(work_t *work, uint8_t number, uint8_t tried)
+static uint8_t replacement_of(profile_plan_t *plan, uint8_t number, uint8_t tried)
 {
-    const profile_entry_t *entry = &work->scene->links->entries[number];
-    const bool for_output = work->out[number] == PDCP_NONE;
+    const profile_entry_t *entry = entry_at(plan, number);
+    const uint8_t input = input_of(plan, number);
+    const bool for_output = input != PDCP_NONE;
     const profile_ref_t *missing = for_output ? &entry->output : &entry->input;
-    const uint8_t partner = for_output ? work->in[number] : work->out[number];
-    const model_t model = {missing->type, missing->profile};
-    return next_candidate(work, &model, for_output ? PDCP_OUTPUT : PDCP_INPUT, partner, tried);
+    const model_t model = {missing->type, missing->profile, for_output ? PDCP_OUTPUT : PDCP_INPUT,
+                           for_output ? input : output_of(plan, number)};
+    return next_candidate(plan, &model, tried);
 }
 
-/* Has this link exactly one end, and nothing that stands in for the other? */
-static bool is_broken(const work_t *work, uint8_t number)
+/* Has this link exactly one end, and nothing that stands in for the other? Notes its ends. */
+static bool is_broken(profile_plan_t *plan, uint8_t number)
 {
-    const profile_entry_t *entry = &work->scene->links->entries[number];
-    if (work->in[number] != PDCP_NONE) {
-        return work->out[number] == PDCP_NONE && work->plan->want[work->in[number]] == PDCP_NONE &&
-               !profile_is_awaited(work->scene, &entry->output);
+    const profile_entry_t *entry = entry_at(plan, number);
+    plan->input = input_of(plan, number);
+    plan->output = output_of(plan, number);
+    if (plan->input != PDCP_NONE) {
+        return plan->output == PDCP_NONE && plan->want[plan->input] == PDCP_NONE &&
+               !profile_is_awaited(plan->scene, &entry->output);
     }
-    return work->out[number] != PDCP_NONE && entry->stand_in == PDCP_NONE &&
-           !profile_is_awaited(work->scene, &entry->input);
+    return plan->output != PDCP_NONE && plan->stand_in[number] == PDCP_NONE &&
+           !profile_is_awaited(plan->scene, &entry->input);
 }
 
-/* How alike the two ends would be with the best replacement, plus 1; 0: there is none. */
-static uint8_t repair_key(work_t *work, uint8_t number)
+/* How alike the two ends would be with the best replacement, plus 1; 0: there is none. NOT_YET. */
+static uint8_t repair_key(profile_plan_t *plan, uint8_t number)
 {
-    begin_search(work);
-    const uint8_t found = is_broken(work, number) ? replacement_of(work, number, PDCP_NONE) : PDCP_NONE;
-    if (found == PDCP_NONE) {
+    if (plan->search_at == 0) {
+        begin_search(plan);
+    }
+    const uint8_t best = is_broken(plan, number) ? replacement_of(plan, number, PDCP_NONE) : PDCP_NONE;
+    if (best == NOT_YET) {
+        return NOT_YET;
+    }
+    if (best == PDCP_NONE) {
         return 0;
     }
-    const pdcp_channel_t *end =
-        channel_of(work, work->in[number] != PDCP_NONE ? work->in[number] : work->out[number]);
-    const model_t model = {end->type, end->profile};
-    return (uint8_t)(score_of(work, found, &model) + 1u);
+    const pdcp_channel_t *end = channel_of(plan, plan->input != PDCP_NONE ? plan->input : plan->output);
+    return (uint8_t)(score_of(plan, best, end->type, end->profile) + 1u);
 }
 
-static void repair(work_t *work, uint8_t number)
+/* Which links are to be repaired first: those whose repaired ends are most alike. */
+static void sort_repairs(profile_plan_t *plan)
 {
-    if (work->in[number] != PDCP_NONE) {
-        (void)connect_input(work, work->in[number], PDCP_NONE, SOURCE_REPLACEMENT, SOURCE_REPLACEMENT);
+    if (plan->at == 0 && plan->search_at == 0) {
+        forget_stand_ins(plan);
+    }
+    if (plan->at < plan->links->count) {
+        const uint8_t key = repair_key(plan, plan->at);
+        if (key == NOT_YET) {
+            return;
+        }
+        plan->of.keys[plan->at] = key;
+    }
+    if (was_last(plan, plan->links->count)) {
+        plan->phase = PHASE_REPAIR_CHOOSE;
+    }
+}
+
+static void repair(profile_plan_t *plan)
+{
+    uint8_t best = PDCP_NONE;
+    uint8_t best_key = 0;
+    for (uint8_t e = 0; e < plan->links->count; e++) {
+        if (plan->of.keys[e] > best_key) {
+            best = e;
+            best_key = plan->of.keys[e];
+        }
+    }
+    plan->left -= EFFORT_FIND;
+    if (best == PDCP_NONE) {
+        plan->phase = PHASE_NAME;
         return;
     }
-    uint8_t tried = PDCP_NONE;
-    begin_search(work);
-    while ((tried = replacement_of(work, number, tried)) != PDCP_NONE) {
-        if (connect_input(work, tried, work->out[number], SOURCE_GIVEN, SOURCE_GIVEN)) {
-            work->scene->links->entries[number].stand_in = tried;
-            return;
-        }
+    plan->of.keys[best] = 0;
+    if (!is_broken(plan, best)) { /* it may have been connected as a need of another */
+        return;
+    }
+    if (plan->input != PDCP_NONE) {
+        connect(plan, plan->input, PDCP_NONE, SOURCE_REPLACEMENT);
+        return;
+    }
+    begin_search(plan);
+    plan->entry = best;
+    plan->phase = PHASE_REPAIR_INPUT; /* input is PDCP_NONE: none was tried yet */
+}
+
+static void try_input(profile_plan_t *plan)
+{
+    const uint8_t input = replacement_of(plan, plan->entry, plan->input);
+    if (input == NOT_YET) {
+        return;
+    }
+    plan->phase = PHASE_REPAIR_CHOOSE;
+    if (input != PDCP_NONE) {
+        plan->input = input;
+        plan->phase = PHASE_REPAIR_LINK;
+        connect(plan, input, plan->output, SOURCE_GIVEN);
     }
 }
 
-/* The links whose repaired ends are most alike come first. */
-static void repair_all(work_t *work)
+static void end_try(profile_plan_t *plan)
 {
-    forget_stand_ins(work);
-    const uint8_t count = work->scene->links->count;
-    uint8_t keys[PROFILE_LINKS_MAX];
-    for (uint8_t e = 0; e < count; e++) {
-        keys[e] = repair_key(work, e);
-    }
-    while (true) {
-        uint8_t best = PDCP_NONE;
-        for (uint8_t e = 0; e < count; e++) {
-            if (keys[e] != 0 && (best == PDCP_NONE || keys[e] > keys[best])) {
-                best = e;
-            }
-        }
-        if (best == PDCP_NONE) {
-            return;
-        }
-        keys[best] = 0;
-        if (is_broken(work, best)) { /* it may have been connected as a need of another */
-            repair(work, best);
-        }
+    plan->phase = PHASE_REPAIR_INPUT;
+    if (plan->want[plan->input] != PDCP_NONE) {
+        plan->stand_in[plan->entry] = plan->input;
+        plan->phase = PHASE_REPAIR_CHOOSE;
     }
 }
 
 /* The input, nobody's, that an output feeds and that is most like a missing one; PDCP_NONE: there is none. */
-static uint8_t fed_instead(work_t *work, uint8_t output, const model_t *missing)
+static uint8_t fed_instead(profile_plan_t *plan, uint8_t output, const profile_ref_t *missing)
 {
-    uint8_t best = PDCP_NONE;
-    uint8_t best_score = PROFILE_CANDIDATE_MIN;
+    plan->best = PDCP_NONE;
+    plan->best_score = PROFILE_CANDIDATE_MIN;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (work->plan->want[i] != output || stands_in(work, i) ||
-            profile_links_of(work->scene->links, work->nodes, i) != PDCP_NONE) {
-            continue;
-        }
-        const uint8_t score = score_of(work, i, missing);
-        if (score > best_score ||
-            (score == best_score && (best == PDCP_NONE || profile_is_before(work->nodes, i, best)))) {
-            best = i;
-            best_score = score;
+        if (plan->want[i] == output && !stands_in(plan, i) && entry_of(plan, i) == PDCP_NONE) {
+            const uint8_t score = score_of(plan, i, missing->type, missing->profile);
+            compare(plan, i, score);
         }
     }
-    return best;
+    plan->left -= EFFORT_SCAN;
+    return plan->best;
 }
 
 /* An output whose input is missing may have been connected as what a replacement requires: it stands in, too,
- * and goes when the original comes back. True: there was such a one. */
-static bool name_stand_ins(work_t *work)
+ * and goes when the original comes back. */
+static void name_stand_in(profile_plan_t *plan)
 {
-    bool any = false;
-    for (uint8_t e = 0; e < work->scene->links->count; e++) {
-        profile_entry_t *entry = &work->scene->links->entries[e];
-        if (work->in[e] == PDCP_NONE && work->out[e] != PDCP_NONE && entry->stand_in == PDCP_NONE) {
-            const model_t missing = {entry->input.type, entry->input.profile};
-            entry->stand_in = fed_instead(work, work->out[e], &missing);
-            any = any || entry->stand_in != PDCP_NONE;
+    const uint8_t e = plan->at;
+    if (e < plan->links->count && plan->stand_in[e] == PDCP_NONE && input_of(plan, e) == PDCP_NONE) {
+        const uint8_t output = output_of(plan, e);
+        if (output != PDCP_NONE) {
+            plan->stand_in[e] = fed_instead(plan, output, &entry_at(plan, e)->input);
+            plan->named = plan->named || plan->stand_in[e] != PDCP_NONE;
         }
     }
-    return any;
+    if (was_last(plan, plan->links->count)) {
+        go_on(plan, PHASE_REPAIR);
+    }
 }
 
 /* --- Autoconfiguration [PROFILE listing 4.7] --- */
 
-static bool is_served_before(const work_t *work, uint8_t a, uint8_t b)
+static bool is_served_before(const profile_plan_t *plan, uint8_t a, uint8_t b)
 {
-    const uint16_t first = profile_priority(channel_of(work, a));
-    const uint16_t second = profile_priority(channel_of(work, b));
-    return first != second ? first < second : profile_is_before(work->nodes, a, b);
+    const uint16_t first = profile_priority(channel_of(plan, a));
+    const uint16_t second = profile_priority(channel_of(plan, b));
+    return first != second ? first < second : profile_is_before(plan->nodes, a, b);
 }
 
 /* The terminal channel that is served next behind the last one; PDCP_NONE: there are no more. */
-static uint8_t next_terminal(const work_t *work, uint8_t last)
+static uint8_t next_terminal(profile_plan_t *plan, uint8_t last)
 {
-    uint8_t best = PDCP_NONE;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (profile_is_ready(work->nodes, i, PDCP_INPUT) && profile_is_terminal(channel_of(work, i)) &&
-            (last == PDCP_NONE || is_served_before(work, last, i)) &&
-            (best == PDCP_NONE || is_served_before(work, i, best))) {
-            best = i;
+    go_on_searching(plan);
+    do {
+        const uint8_t i = plan->search_at;
+        if (is_ready(plan, i, PDCP_INPUT) && profile_is_terminal(channel_of(plan, i))) {
+            plan->left -= 4;
+            if ((last == PDCP_NONE || is_served_before(plan, last, i)) &&
+                (plan->best == PDCP_NONE || is_served_before(plan, i, plan->best))) {
+                plan->best = i;
+            }
         }
-    }
-    return best;
+    } while (next_channel(plan));
+    return found(plan);
 }
 
-static void autoconfigure(work_t *work)
+static void autoconfigure(profile_plan_t *plan)
 {
-    uint8_t input = PDCP_NONE;
-    while ((input = next_terminal(work, input)) != PDCP_NONE) {
-        const bool configured = profile_links_of(work->scene->links, work->nodes, input) != PDCP_NONE;
-        if (work->plan->want[input] == PDCP_NONE && !(configured && work->waits)) {
-            (void)connect_input(work, input, PDCP_NONE, SOURCE_SIMILAR, SOURCE_SIMILAR);
-        }
+    const uint8_t input = next_terminal(plan, plan->input);
+    if (input == NOT_YET) {
+        return;
+    }
+    plan->input = input;
+    if (input == PDCP_NONE) {
+        go_on(plan, PHASE_AUTO);
+    } else if (plan->want[input] == PDCP_NONE && !(plan->waits && entry_of(plan, input) != PDCP_NONE)) {
+        connect(plan, input, PDCP_NONE, SOURCE_SIMILAR);
     }
 }
 
 /* --- The whole --- */
 
+#define HASH_START 2166136261uL
+
+static uint32_t hash(uint32_t sum, uint8_t byte) /* FNV-1a */
+{
+    return (sum ^ byte) * 16777619uL;
+}
+
+static uint32_t hash_want(profile_plan_t *plan)
+{
+    uint32_t sum = HASH_START;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        sum = hash(sum, plan->want[i]);
+    }
+    plan->left -= 2 * EFFORT_SCAN;
+    return sum;
+}
+
+/* The output that feeds an input, as the tables are; PDCP_NONE: none does. */
+static uint8_t working(const profile_scene_t *scene, uint8_t input)
+{
+    const pdcp_channel_t *channel = &scene->nodes->channels[input];
+    const bool works =
+        channel->link == PDCP_LINK_ACTIVE && profile_is_ready(scene->nodes, input, PDCP_INPUT) &&
+        profile_is_ready(scene->nodes, channel->feed, PDCP_OUTPUT) && !profile_bit(scene->made, input);
+    return works ? channel->feed : PDCP_NONE;
+}
+
+static void look(profile_plan_t *plan)
+{
+    const uint8_t output = working(plan->scene, plan->at);
+    plan->base = hash(plan->base, output);
+    give_back(plan, plan->at, output);
+    if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        plan->phase = PHASE_AWAITED;
+    }
+}
+
+static void find_awaited(profile_plan_t *plan)
+{
+    const profile_entry_t *entry = entry_at(plan, plan->at);
+    if (plan->at < plan->links->count) {
+        plan->left -= 2 * EFFORT_FIND;
+        plan->waits = plan->waits || profile_is_awaited(plan->scene, &entry->output) ||
+                      profile_is_awaited(plan->scene, &entry->input);
+    }
+    if (was_last(plan, plan->links->count)) {
+        forget_stand_ins(plan);
+        plan->phase = (plan->what & PROFILE_PLAN_ENFORCE) != 0 ? PHASE_ENFORCE : PHASE_ROUND;
+    }
+}
+
+static void begin_round(profile_plan_t *plan)
+{
+    plan->named = false;
+    plan->before = hash_want(plan);
+    go_on(plan, PHASE_ROUND);
+}
+
 /* Takes away, until nothing changes, links that require an input which is not connected (D-PRO-9). A loop in
  * which all are connected stays. */
-static void settle(work_t *work)
+static void settle(profile_plan_t *plan)
 {
-    bool changed = true;
-    while (changed) {
-        changed = false;
-        for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-            if (work->plan->want[i] != PDCP_NONE && lacks_need(work, i) && !is_left_alone(work, i)) {
-                unlink_input(work, i);
-                changed = true;
-            }
+    if (is_lacking(plan, plan->at)) {
+        unlink_input(plan, plan->at);
+        plan->changed = true;
+    }
+    if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        if (!plan->changed) {
+            go_on(plan, PHASE_SETTLE);
         }
+        plan->changed = false;
     }
-}
-
-/* Which ends of the configuration are there. */
-static void find_ends(work_t *work)
-{
-    const profile_links_t *links = work->scene->links;
-    for (uint8_t e = 0; e < links->count; e++) {
-        const profile_entry_t *entry = &links->entries[e];
-        work->out[e] = profile_links_channel(links, work->nodes, &entry->output, PDCP_OUTPUT);
-        work->in[e] = profile_links_channel(links, work->nodes, &entry->input, PDCP_INPUT);
-        work->waits = work->waits || profile_is_awaited(work->scene, &entry->output) ||
-                      profile_is_awaited(work->scene, &entry->input);
-    }
-}
-
-/* The links that work, and which ends of the configuration are there. */
-static void look(work_t *work, profile_plan_t *plan, const profile_scene_t *scene)
-{
-    memset(work, 0, sizeof *work);
-    work->needs_last = SOURCE_SIMILAR;
-    work->plan = plan;
-    work->scene = scene;
-    work->nodes = scene->nodes;
-    plan->steps = 0;
-    memset(plan->want, PDCP_NONE, sizeof plan->want);
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *channel = &scene->nodes->channels[i];
-        if (profile_is_ready(scene->nodes, i, PDCP_INPUT) && channel->link == PDCP_LINK_ACTIVE &&
-            profile_is_ready(scene->nodes, channel->feed, PDCP_OUTPUT) && !get_bit(scene->made, i)) {
-            link_input(work, i, channel->feed);
-        }
-    }
-    find_ends(work);
-    forget_stand_ins(work);
 }
 
 /* What a plan takes away may make room for what it has passed over: it goes round until nothing changes. */
-void profile_plan_make(profile_plan_t *plan, const profile_scene_t *scene, uint8_t what)
+static void end_round(profile_plan_t *plan)
 {
-    work_t work;
-    uint8_t before[PDCP_CHANNELS_MAX];
-    uint8_t rounds = ROUNDS_MAX;
-    bool named;
-    look(&work, plan, scene);
-    do {
-        named = false;
-        memcpy(before, plan->want, sizeof before);
-        if ((what & PROFILE_PLAN_ORIGINALS) != 0) {
-            bring_back_all(&work);
-        }
-        if ((what & PROFILE_PLAN_REPLACE) != 0) {
-            repair_all(&work);
-            named = name_stand_ins(&work);
-        }
-        settle(&work);
-        if ((what & PROFILE_PLAN_AUTO) != 0) {
-            autoconfigure(&work);
-        }
-        rounds--;
-    } while (rounds != 0 && (named || memcmp(before, plan->want, sizeof before) != 0));
-    forget_stand_ins(&work);
-}
-
-/* An input gives up its source, in the configuration too. */
-static void drop(work_t *work, uint8_t input)
-{
-    const uint8_t entry = profile_links_of(work->scene->links, work->nodes, input);
-    unlink_input(work, input);
-    if (entry != PDCP_NONE) {
-        profile_links_remove(work->scene->links, entry);
+    plan->rounds--;
+    plan->phase = PHASE_FINISH;
+    if (plan->rounds != 0 && (plan->named || plan->before != hash_want(plan))) {
+        plan->phase = PHASE_ROUND;
     }
 }
 
-void profile_plan_enforce(profile_plan_t *plan, const profile_scene_t *scene)
+/* An input gives up its source, in the configuration too when the plan is done: it is marked as gone. */
+static void drop(profile_plan_t *plan, uint8_t input)
 {
-    work_t work;
-    look(&work, plan, scene);
+    unlink_input(plan, input);
+    profile_set_bit(plan->of.bits.gone, input, true);
+}
+
+/* Of the sole-access inputs of one output the first one keeps it. */
+static void enforce(profile_plan_t *plan)
+{
+    const uint8_t i = plan->at;
+    const uint8_t output = plan->want[i];
+    for (uint8_t k = 0; output != PDCP_NONE && k < PDCP_CHANNELS_MAX && profile_is_sole(channel_of(plan, i));
+         k++) {
+        if (plan->want[k] == output && k != i && profile_is_sole(channel_of(plan, k))) {
+            drop(plan, profile_is_before(plan->nodes, k, i) ? i : k);
+        }
+    }
+    plan->left -= EFFORT_SCAN;
+    if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        go_on(plan, PHASE_REPAIR);
+    }
+}
+
+static void remove_dropped(const profile_plan_t *plan)
+{
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const uint8_t output = plan->want[i];
-        if (output == PDCP_NONE || !profile_is_sole(&scene->nodes->channels[i])) {
-            continue;
-        }
-        for (uint8_t k = 0; k < PDCP_CHANNELS_MAX; k++) {
-            if (plan->want[k] == output && k != i && profile_is_sole(&scene->nodes->channels[k])) {
-                drop(&work, profile_is_before(scene->nodes, k, i) ? i : k);
-            }
+        const uint8_t entry =
+            profile_bit(plan->of.bits.gone, i) ? profile_links_of(plan->links, plan->nodes, i) : PDCP_NONE;
+        if (entry != PDCP_NONE) {
+            profile_links_remove(plan->links, entry);
         }
     }
-    find_ends(&work);
-    settle(&work);
-    forget_stand_ins(&work);
+}
+
+static void finish(profile_plan_t *plan)
+{
+    forget_stand_ins(plan);
+    for (uint8_t e = 0; e < plan->links->count; e++) {
+        entry_at(plan, e)->stand_in = plan->stand_in[e];
+    }
+    if ((plan->what & PROFILE_PLAN_ENFORCE) != 0) {
+        remove_dropped(plan);
+    }
+    plan->phase = PHASE_DONE;
+}
+
+static void (*const phases[])(profile_plan_t *) = {[PHASE_LOOK] = look,
+                                                   [PHASE_AWAITED] = find_awaited,
+                                                   [PHASE_ROUND] = begin_round,
+                                                   [PHASE_ORIGINAL] = bring_back,
+                                                   [PHASE_REPAIR] = sort_repairs,
+                                                   [PHASE_SETTLE] = settle,
+                                                   [PHASE_AUTO] = autoconfigure,
+                                                   [PHASE_ROUND_END] = end_round,
+                                                   [PHASE_ORIGINAL_TAKE] = take_for_original,
+                                                   [PHASE_ORIGINAL_LINK] = link_original,
+                                                   [PHASE_ORIGINAL_JUDGE] = judge_original,
+                                                   [PHASE_REPAIR_CHOOSE] = repair,
+                                                   [PHASE_REPAIR_INPUT] = try_input,
+                                                   [PHASE_REPAIR_LINK] = end_try,
+                                                   [PHASE_NAME] = name_stand_in,
+                                                   [PHASE_ENFORCE] = enforce,
+                                                   [PHASE_FINISH] = finish};
+
+static bool is_set_up(const profile_scene_t *scene, uint8_t place)
+{
+    return scene->nodes->nodes[place].state == PDCP_NODE_READY;
+}
+
+void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint8_t what)
+{
+    memset(plan, 0, sizeof *plan);
+    memset(plan->want, PDCP_NONE, sizeof plan->want);
+    plan->what = what | ALWAYS;
+    plan->rounds = what == PROFILE_PLAN_ENFORCE ? 1 : ROUNDS_MAX;
+    plan->base = HASH_START;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        profile_set_bit(plan->ready, i, is_set_up(scene, i));
+    }
+    for (uint8_t e = 0; e < scene->links->count; e++) {
+        plan->stand_in[e] = scene->links->entries[e].stand_in;
+    }
+}
+
+bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16_t effort)
+{
+    plan->scene = scene;
+    plan->nodes = scene->nodes;
+    plan->links = scene->links;
+    plan->left = effort;
+    while (plan->phase != PHASE_DONE && plan->left > 0) {
+        plan->left--;
+        if (plan->connecting) {
+            advance(plan);
+        } else if (plan->finding) {
+            find_next(plan);
+        } else {
+            phases[plan->phase](plan);
+        }
+    }
+    return plan->phase == PHASE_DONE;
+}
+
+bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene)
+{
+    bool stale = false;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        stale = stale || profile_bit(plan->ready, i) != is_set_up(scene, i);
+    }
+    return stale;
+}
+
+bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)
+{
+    uint32_t sum = HASH_START;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        sum = hash(sum, working(scene, i));
+    }
+    return sum != plan->base;
 }
 
 bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)

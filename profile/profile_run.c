@@ -6,17 +6,6 @@
 #include "pdcp_time.h"
 #include "profile_match.h"
 
-static bool get_bit(const uint8_t *bits, uint8_t number)
-{
-    return (bits[number / 8] & (1u << (number % 8))) != 0;
-}
-
-static void set_bit(uint8_t *bits, uint8_t number, bool value)
-{
-    const uint8_t mask = (uint8_t)(1u << (number % 8));
-    bits[number / 8] = (uint8_t)(value ? bits[number / 8] | mask : bits[number / 8] & ~mask);
-}
-
 static const pdcp_nodes_t *nodes_of(const pdcp_arb_t *arb)
 {
     return &arb->bus.nodes;
@@ -39,6 +28,7 @@ static void wait_for_start(profile_run_t *run, uint32_t now_ms)
     run->state = PROFILE_WAITING;
     run->due = 0;
     run->planning = false;
+    run->making = PROFILE_NOT_MAKING;
     run->wishing = false;
     run->stored = false;
     run->stirred_ms = now_ms;
@@ -64,9 +54,21 @@ bool profile_run_take_change(profile_run_t *run)
 
 /* --- The active configuration follows what happens --- */
 
+static bool store_link(profile_run_t *run, const profile_link_t *link, bool by_host)
+{
+    run->stale = true;
+    return profile_links_put(&run->links, link, by_host);
+}
+
+static void remove_entry(profile_run_t *run, uint8_t entry)
+{
+    run->stale = true;
+    profile_links_remove(&run->links, entry);
+}
+
 static void put_link(profile_run_t *run, const profile_link_t *link, bool by_host)
 {
-    if (!run->frozen && profile_links_put(&run->links, link, by_host)) {
+    if (!run->frozen && store_link(run, link, by_host)) {
         run->changed = true;
     }
 }
@@ -116,8 +118,8 @@ static uint8_t entry_of(const profile_run_t *run, const pdcp_arb_t *arb, uint8_t
 static bool is_new(const profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
     profile_link_t link;
-    return profile_is_ready(nodes_of(arb), input, PDCP_INPUT) &&
-           channel_of(arb, input)->link == PDCP_LINK_ACTIVE && entry_of(run, arb, input) == PDCP_NONE &&
+    return channel_of(arb, input)->link == PDCP_LINK_ACTIVE &&
+           profile_is_ready(nodes_of(arb), input, PDCP_INPUT) && entry_of(run, arb, input) == PDCP_NONE &&
            !is_stand_in(run, input) && link_of(run, arb, input, &link);
 }
 
@@ -141,14 +143,15 @@ bool profile_run_is_complete(const profile_run_t *run, const pdcp_arb_t *arb)
     return true;
 }
 
-/* The input of a device (PDCP_NONE: of any) that comes next behind the last one; PDCP_NONE: there are no
- * more. */
+/* The input of a device (PDCP_NONE: of any) that names a source and comes next behind the last one;
+ * PDCP_NONE: there are no more. */
 static uint8_t next_read_back(const pdcp_nodes_t *nodes, uint8_t node, uint8_t last)
 {
     uint8_t best = PDCP_NONE;
+    profile_end_t source;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (profile_is_ready(nodes, i, PDCP_INPUT) &&
-            (node == PDCP_NONE || nodes->channels[i].node == node) &&
+        if ((node == PDCP_NONE || nodes->channels[i].node == node) &&
+            profile_is_ready(nodes, i, PDCP_INPUT) && profile_source_of(nodes, i, &source) &&
             (last == PDCP_NONE || profile_is_before(nodes, last, i)) &&
             (best == PDCP_NONE || profile_is_before(nodes, i, best))) {
             best = i;
@@ -174,7 +177,7 @@ void profile_run_load_begin(profile_run_t *run, bool keep_host)
 {
     for (uint8_t e = run->links.count; e > 0; e--) {
         if (!keep_host || !run->links.entries[e - 1].by_host) {
-            profile_links_remove(&run->links, (uint8_t)(e - 1));
+            remove_entry(run, (uint8_t)(e - 1));
         }
     }
 }
@@ -184,7 +187,7 @@ bool profile_run_load_link(profile_run_t *run, const profile_link_t *link)
     if (profile_links_find(&run->links, &link->input.owner, link->input.index) != PDCP_NONE) {
         return true;
     }
-    return profile_links_put(&run->links, link, false);
+    return store_link(run, link, false);
 }
 
 /* The entry that the working link of an input replaces: the one that it stands in for, or its own if its
@@ -211,7 +214,7 @@ uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb)
             profile_is_ready(nodes_of(arb), i, PDCP_INPUT) && channel_of(arb, i)->link == PDCP_LINK_ACTIVE;
         const uint8_t entry = works ? replaced_by(run, arb, i) : PDCP_NONE;
         if (entry != PDCP_NONE) {
-            profile_links_remove(&run->links, entry);
+            remove_entry(run, entry);
             adopt_link(run, arb, i);
             adopted++;
         }
@@ -229,11 +232,35 @@ void profile_run_freeze(profile_run_t *run, const pdcp_arb_t *arb, bool frozen)
 
 /* --- Events --- */
 
-static uint8_t hot_swap_what(const profile_run_t *run)
+static profile_scene_t scene_of(profile_run_t *run, const pdcp_arb_t *arb)
 {
-    return (
-        uint8_t)(PROFILE_PLAN_ORIGINALS |
-                 (run->hot_swap ? PROFILE_PLAN_REPLACE | (run->autoconfigure ? PROFILE_PLAN_AUTO : 0) : 0));
+    const profile_scene_t scene = {.nodes = nodes_of(arb),
+                                   .links = &run->links,
+                                   .made = run->made,
+                                   .awaited = run->awaited,
+                                   .banned = run->banned,
+                                   .banned_count = run->banned_count};
+    return scene;
+}
+
+/* All that is to be planned, as far as the flags allow it. */
+static uint8_t what_of(const profile_run_t *run, bool replace)
+{
+    uint8_t what = PROFILE_PLAN_ORIGINALS;
+    if (replace) {
+        what |= PROFILE_PLAN_REPLACE;
+        if (run->autoconfigure) {
+            what |= PROFILE_PLAN_AUTO;
+        }
+    }
+    return what;
+}
+
+/* The next plan is due, for what is due already and this. */
+static void make_due(profile_run_t *run, uint8_t what)
+{
+    run->due |= what;
+    run->urgent = true;
 }
 
 static void plan_soon(profile_run_t *run, uint32_t now_ms, bool urgent)
@@ -247,7 +274,7 @@ static void plan_soon(profile_run_t *run, uint32_t now_ms, bool urgent)
         run->urgent = false;
     }
     run->banned_count = 0;
-    run->due = (uint8_t)(run->due | hot_swap_what(run));
+    run->due |= what_of(run, run->hot_swap);
     run->urgent = run->urgent || urgent;
 }
 
@@ -255,8 +282,7 @@ static void plan_soon(profile_run_t *run, uint32_t now_ms, bool urgent)
 static void plan_at_once(profile_run_t *run, profile_plan_what_t what)
 {
     if (run->state != PROFILE_WAITING) {
-        run->due = (uint8_t)(run->due | (uint8_t)what);
-        run->urgent = true;
+        make_due(run, (uint8_t)what);
     }
 }
 
@@ -265,7 +291,7 @@ static void forget_dropping(profile_run_t *run, const pdcp_arb_t *arb, uint8_t n
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         if (channel_of(arb, i)->node == node) {
-            set_bit(run->dropping, i, false);
+            profile_set_bit(run->dropping, i, false);
         }
     }
 }
@@ -273,7 +299,7 @@ static void forget_dropping(profile_run_t *run, const pdcp_arb_t *arb, uint8_t n
 static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     forget_dropping(run, arb, node);
-    set_bit(run->awaited, node, false);
+    profile_set_bit(run->awaited, node, false);
     if (run->state != PROFILE_WAITING && !run->stored) {
         read_back(run, arb, node);
     }
@@ -317,15 +343,24 @@ static void on_wish(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, 
     run->wishing = false;
     if (event->status == PDCP_OK) {
         run->tries = 1;
-        set_bit(run->made, run->wish_input, true);
+        profile_set_bit(run->made, run->wish_input, true);
         run->moves++;
     } else {
         if (!is_worth_another_try(run, (pdcp_status_t)event->status)) {
             ban(run, now_ms);
         }
-        run->due = (uint8_t)(run->due | run->what);
-        run->urgent = true;
+        make_due(run, run->what);
     }
+}
+
+/* Is the working link of an input another one than the plan knows or wants? */
+static bool is_unexpected(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
+{
+    if (run->making == PROFILE_MAKING) {
+        const profile_scene_t scene = scene_of(run, arb);
+        return profile_plan_links_differ(&run->plan, &scene);
+    }
+    return channel_of(arb, input)->feed != run->plan.want[input];
 }
 
 /* An input's device has asked for its link (Update Data Channel). It may lack what it requires, or break sole
@@ -336,10 +371,9 @@ static void on_asked(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input, u
     if (entry == PDCP_NONE && !is_stand_in(run, input)) {
         adopt_link(run, arb, input);
     }
-    if (channel->link == PDCP_LINK_ACTIVE && channel->feed != run->plan.want[input]) {
-        set_bit(run->made, input, profile_breaks_sole_access(nodes_of(arb), channel->feed, input));
-        run->due = (uint8_t)(run->due | hot_swap_what(run));
-        run->urgent = true;
+    if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, arb, input)) {
+        profile_set_bit(run->made, input, profile_breaks_sole_access(nodes_of(arb), channel->feed, input));
+        make_due(run, what_of(run, run->hot_swap));
     }
 }
 
@@ -349,7 +383,7 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 {
     run->plan.want[input] = PDCP_NONE;
     if (entry != PDCP_NONE && !run->frozen) {
-        profile_links_remove(&run->links, entry);
+        remove_entry(run, entry);
         run->changed = true;
     }
     plan_at_once(run, PROFILE_PLAN_SETTLE);
@@ -361,12 +395,12 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     const uint8_t status = channel_of(arb, input)->link;
     const uint8_t entry = entry_of(run, arb, input);
     if (status == PDCP_LINK_NONE) {
-        if (arb->bus.link.kind == PDCP_TODO_REMOVE && !get_bit(run->dropping, input)) {
+        if (arb->bus.link.kind == PDCP_TODO_REMOVE && !profile_bit(run->dropping, input)) {
             on_removed(run, input, entry);
         }
-        set_bit(run->dropping, input, false);
+        profile_set_bit(run->dropping, input, false);
     } else if (run->state != PROFILE_WAITING && !run->stored && !run->wishing &&
-               !get_bit(run->dropping, input)) {
+               !profile_bit(run->dropping, input)) {
         on_asked(run, arb, input, entry);
     }
 }
@@ -384,7 +418,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         break;
     case PDCP_EVENT_RESET:
         if (event->status == PDCP_OK) {
-            set_bit(run->awaited, event->node, true);
+            profile_set_bit(run->awaited, event->node, true);
             run->awaited_ms = now_ms + PROFILE_RESET_MS;
         }
         break;
@@ -407,17 +441,6 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
 
 /* --- Plans --- */
 
-static profile_scene_t scene_of(profile_run_t *run, const pdcp_arb_t *arb)
-{
-    const profile_scene_t scene = {.nodes = nodes_of(arb),
-                                   .links = &run->links,
-                                   .made = run->made,
-                                   .awaited = run->awaited,
-                                   .banned = run->banned,
-                                   .banned_count = run->banned_count};
-    return scene;
-}
-
 /* What the plan under way was about to take away does not count as working for the next one, which would not
  * know any more that it only stood in. */
 static void leave_unwanted(profile_run_t *run, const pdcp_arb_t *arb)
@@ -426,27 +449,40 @@ static void leave_unwanted(profile_run_t *run, const pdcp_arb_t *arb)
         const pdcp_channel_t *channel = channel_of(arb, i);
         if (profile_is_ready(nodes_of(arb), i, PDCP_INPUT) && channel->link == PDCP_LINK_ACTIVE &&
             channel->feed != run->plan.want[i]) {
-            set_bit(run->made, i, true);
+            profile_set_bit(run->made, i, true);
         }
     }
 }
 
-static void make_plan(profile_run_t *run, const pdcp_arb_t *arb)
+static void begin_plan(profile_run_t *run, const pdcp_arb_t *arb)
 {
-    const profile_scene_t scene = scene_of(run, arb);
-    if (run->planning) {
+    if (run->planning && run->making != PROFILE_MAKING) {
         leave_unwanted(run, arb);
     }
     run->state = PROFILE_CONFIGURING;
     run->planning = true;
     run->due = 0;
     run->urgent = false;
+    run->making = PROFILE_MAKING;
+    run->stale = true;
     if (run->purpose == PROFILE_FOR_CLEAR) {
+        run->making = PROFILE_JUST_MADE;
         memset(run->plan.want, PDCP_NONE, sizeof run->plan.want);
-    } else if (run->purpose == PROFILE_FOR_ENFORCE) {
-        profile_plan_enforce(&run->plan, &scene);
-    } else {
-        profile_plan_make(&run->plan, &scene, run->what);
+    }
+}
+
+/* Makes a slice of the plan, of a new one if what it is made from has changed. Nothing of it counts before it
+ * is done. */
+static void make_slice(profile_run_t *run, const pdcp_arb_t *arb)
+{
+    const profile_scene_t scene = scene_of(run, arb);
+    if (run->stale || profile_plan_is_stale(&run->plan, &scene)) {
+        run->stale = false;
+        profile_plan_begin(&run->plan, &scene,
+                           run->purpose == PROFILE_FOR_ENFORCE ? PROFILE_PLAN_ENFORCE : run->what);
+    }
+    if (profile_plan_step(&run->plan, &scene, PROFILE_PLAN_SLICE)) {
+        run->making = PROFILE_JUST_MADE;
     }
 }
 
@@ -458,7 +494,7 @@ static void forget_working(profile_run_t *run, const pdcp_arb_t *arb)
         const uint8_t input =
             profile_links_channel(&run->links, nodes_of(arb), &run->links.entries[e].input, PDCP_INPUT);
         if (run->links.entries[e].by_host && input != PDCP_NONE) {
-            set_bit(run->made, input, false);
+            profile_set_bit(run->made, input, false);
         }
     }
 }
@@ -479,18 +515,16 @@ void profile_run_begin(profile_run_t *run, pdcp_arb_t *arb, profile_purpose_t pu
         run->changed = true;
     }
     pdcp_arb_plan_links(arb, run->stored);
-    make_plan(run, arb);
+    begin_plan(run, arb);
 }
 
 void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored)
 {
-    const uint8_t what = (uint8_t)(PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE |
-                                   (run->autoconfigure ? PROFILE_PLAN_AUTO : 0));
     run->stored = stored;
     if (!stored) {
         read_back(run, arb, PDCP_NONE);
     }
-    profile_run_begin(run, arb, stored ? PROFILE_FOR_LOAD : PROFILE_FOR_START, what);
+    profile_run_begin(run, arb, stored ? PROFILE_FOR_LOAD : PROFILE_FOR_START, what_of(run, true));
 }
 
 bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb)
@@ -504,7 +538,7 @@ bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb)
 
 bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    return profile_run_is_starting(run, arb) && !pdcp_arb_setup_running(arb) &&
+    return profile_run_is_starting(run, arb) && !pdcp_arb_setup_running(arb) && pdcp_arb_links_settled(arb) &&
            pdcp_time_reached(now_ms, arb->asked_ms + PROFILE_QUIET_MS) &&
            pdcp_time_reached(now_ms, run->stirred_ms + PROFILE_QUIET_MS);
 }
@@ -529,7 +563,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
     if (channel->link == PDCP_LINK_ACTIVE) {
         run->moves++;
     }
-    set_bit(run->dropping, input, true);
+    profile_set_bit(run->dropping, input, true);
     (void)pdcp_arb_disconnect(arb, input);
 }
 
@@ -554,7 +588,7 @@ static bool unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     bool any = false;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (!profile_is_ready(nodes_of(arb), i, PDCP_INPUT) || run->plan.want[i] != PDCP_NONE) {
+        if (run->plan.want[i] != PDCP_NONE || !profile_is_ready(nodes_of(arb), i, PDCP_INPUT)) {
             continue;
         }
         if (channel_of(arb, i)->link == PDCP_LINK_NONE) {
@@ -575,8 +609,8 @@ static uint8_t next_input(const profile_run_t *run, const pdcp_arb_t *arb)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t output = run->plan.want[i];
         const pdcp_channel_t *channel = channel_of(arb, i);
-        if (!profile_is_ready(nodes_of(arb), i, PDCP_INPUT) ||
-            !profile_is_ready(nodes_of(arb), output, PDCP_OUTPUT) ||
+        if (!profile_is_ready(nodes_of(arb), output, PDCP_OUTPUT) ||
+            !profile_is_ready(nodes_of(arb), i, PDCP_INPUT) ||
             (channel->link == PDCP_LINK_ACTIVE && channel->feed == output)) {
             continue;
         }
@@ -616,7 +650,7 @@ static bool carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
     run->wish_input = input;
     run->wish_output = run->plan.want[input];
-    run->wishing = pdcp_arb_connect(arb, run->wish_output, run->wish_input) == PDCP_OK;
+    run->wishing = pdcp_arb_connect(arb, run->wish_output, input) == PDCP_OK;
     if (!run->wishing) { /* a device has changed its channels meanwhile */
         plan_soon(run, now_ms, true);
     }
@@ -668,9 +702,14 @@ bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
             run->moves = 0;
             run->what = 0;
         }
-        run->what = (uint8_t)(run->what | run->due);
-        make_plan(run, arb);
+        run->what |= run->due;
+        begin_plan(run, arb);
     }
+    if (run->making == PROFILE_MAKING) {
+        make_slice(run, arb);
+        return false;
+    }
+    run->making = PROFILE_NOT_MAKING;
     return run->planning && carry_on(run, arb, now_ms);
 }
 
@@ -687,6 +726,9 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
             (pdcp_time_before(run->stirred_ms, arb->asked_ms) ? arb->asked_ms : run->stirred_ms) +
             PROFILE_QUIET_MS;
         return pdcp_time_before(now_ms, quiet_ms) ? quiet_ms : next_ms;
+    }
+    if (run->making != PROFILE_NOT_MAKING) {
+        return now_ms;
     }
     if (has_awaited(run)) {
         next_ms = earlier(next_ms, run->awaited_ms);

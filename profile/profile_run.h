@@ -1,8 +1,10 @@
 /* The profile layer at work (profile-layer.md 4): when to plan, and how a plan becomes bus traffic.
  *
- * It waits for the start-up, then plans whenever a device is lost or has been set up. Of a plan it carries
- * out one link after the other. A link that cannot be made is banned and the plan is made anew, without what
- * the failed one has made (D-PRO-5). What it knows of stored configurations its owner tells it (arb_limb.h).
+ * It waits for the start-up, then plans whenever a device is lost or has been set up. A step makes one slice
+ * of a plan; when the tables have changed before it is done, it is begun anew (D-PRO-23). Of a plan that is
+ * done it carries out one link after the other. A link that cannot be made is banned and the plan is made
+ * anew, without what the failed one has made (D-PRO-5). What it knows of stored configurations its owner
+ * tells it (arb_limb.h).
  */
 #ifndef PROFILE_RUN_H
 #define PROFILE_RUN_H
@@ -28,6 +30,13 @@ typedef enum {
     PROFILE_RUNNING = 2
 } profile_state_t;
 
+/* How a plan is being made; not 0: the next step goes on without delay (D-PRO-23). */
+typedef enum {
+    PROFILE_NOT_MAKING = 0,
+    PROFILE_MAKING,   /* slice by slice */
+    PROFILE_JUST_MADE /* carried out from the next step on */
+} profile_making_t;
+
 /* What a plan is made for. */
 typedef enum {
     PROFILE_FOR_EVENT,   /* from the links that work */
@@ -51,7 +60,9 @@ typedef struct {
     uint8_t purpose;    /* profile_purpose_t of the plan under way */
     uint8_t what;       /* profile_plan_what_t of the plan under way */
     uint8_t due;        /* of the plan to be made next, 0: none is */
-    bool planning;      /* a plan is being carried out */
+    bool planning;      /* a plan is being made or carried out */
+    uint8_t making;     /* profile_making_t */
+    bool stale;         /* and what it is made from has changed */
     bool wishing;       /* the link of wish_output to wish_input has been asked for */
     bool urgent;        /* the plan that is due does not wait for devices being set up */
     bool stored;        /* the configuration is a stored one (D-PRO-6) */
@@ -77,7 +88,8 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
 /* Is a device set up, and the start-up still to come? */
 bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb);
 
-/* May the start-up begin: is a device set up, and has there been quiet for PROFILE_QUIET_MS? */
+/* May the start-up begin: is a device set up, no link half made, and has there been quiet for
+ * PROFILE_QUIET_MS? */
 bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms);
 
 /* Empties the active configuration for one that is to be loaded; keep_host leaves links that the host has

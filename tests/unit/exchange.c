@@ -71,7 +71,9 @@ void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, c
 void exchange_step(exchange_t *x)
 {
     if (x->app != NULL) {
-        (void)arb_app_step(x->app, x->now_ms);
+        do {
+            (void)arb_app_step(x->app, x->now_ms);
+        } while (x->app->limb.run.making); /* a plan takes several steps */
     } else {
         (void)pdcp_arb_step(x->arb, x->now_ms);
     }

@@ -281,7 +281,12 @@ profile_scene_t systems_scene(systems_t *s)
 void systems_plan(systems_t *s, uint8_t what)
 {
     const profile_scene_t scene = systems_scene(s);
-    profile_plan_make(&s->plan, &scene, what);
+    profile_plan_begin(&s->plan, &scene, what);
+    const int16_t slice = s->slice != 0 ? s->slice : 30000;
+    while (!profile_plan_step(&s->plan, &scene, slice)) {
+        const int16_t beyond = (int16_t)-s->plan.left;
+        s->beyond = beyond > s->beyond ? beyond : s->beyond;
+    }
 }
 
 static bool stands_in(const systems_t *s, uint8_t input)

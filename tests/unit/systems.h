@@ -40,6 +40,8 @@ typedef struct {
     uint8_t awaited[PROFILE_PLACE_BYTES];
     profile_pair_t banned[PROFILE_BANNED_MAX];
     uint8_t banned_count;
+    int16_t beyond;                       /* effort by which a slice was longer than it should be, at most */
+    int16_t slice;                        /* effort of a slice of the planner; 0: a plan is made in one go */
     pdcp_identity_t named[SYSTEMS_NAMES]; /* of D0, D1, ... */
 } systems_t;
 

@@ -715,7 +715,7 @@ static void test_a_slow_device_is_written(void)
 }
 
 /* The same with a link: every write is answered at the last moment. It is undone, and can be made after. */
-static void test_a_slow_device_is_linked(void)
+static void expect_that_it_is_undone(uint32_t quiet_ms)
 {
     static const exchange_pair_t making[] = {
         {"312#04 05 01 0200 0200", "212#84 01 05 01"},
@@ -729,7 +729,7 @@ static void test_a_slow_device_is_linked(void)
     int ms = 0;
     int k = 0;
     add_devices();
-    exchange_pass(&x, 600); /* the start-up */
+    exchange_pass(&x, quiet_ms);
     exchange_beacons(&x);
     x.arb->bus.nodes.nodes[1].ack_ms = 500;
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
@@ -749,6 +749,17 @@ static void test_a_slow_device_is_linked(void)
     exchange_run(&x, making);
     expect(0x2308, BYTES(2));
     TEST_ASSERT_EQUAL(0, hostlink_waiting());
+}
+
+static void test_a_slow_device_is_linked(void)
+{
+    expect_that_it_is_undone(600); /* after the start-up */
+}
+
+/* The start-up does not take a link that is half made for one of the limb's. */
+static void test_a_slow_device_is_linked_before_the_start_up(void)
+{
+    expect_that_it_is_undone(0);
 }
 
 int main(void)
@@ -785,5 +796,6 @@ int main(void)
     RUN_TEST(test_a_slow_device_is_read);
     RUN_TEST(test_a_slow_device_is_written);
     RUN_TEST(test_a_slow_device_is_linked);
+    RUN_TEST(test_a_slow_device_is_linked_before_the_start_up);
     return UNITY_END();
 }

@@ -806,9 +806,8 @@ static void test_only_what_is_asked_for_is_planned(void)
 static void enforce(const char *links)
 {
     char text[SYSTEMS_TEXT];
-    const profile_scene_t scene = systems_scene(&s);
     for (uint8_t i = 0; i < 2; i++) {
-        profile_plan_enforce(&s.plan, &scene);
+        systems_plan(&s, PROFILE_PLAN_ENFORCE);
         systems_planned(&s, text);
         TEST_ASSERT_EQUAL_STRING(links, text);
         systems_execute(&s);
@@ -877,6 +876,7 @@ static void add_symmetric(uint8_t number, uint8_t half)
 static void plan_symmetric(uint8_t channels, uint8_t half)
 {
     systems_init(&s);
+    s.slice = PROFILE_PLAN_SLICE;
     for (int n = 0; n < channels / 2 / half; n++) {
         add_symmetric((uint8_t)(n + 1), half);
     }
@@ -892,6 +892,7 @@ static void test_steps_grow_with_the_channels(void)
         for (unsigned i = 0; i < sizeof sizes; i++) {
             plan_symmetric(sizes[i], half);
             TEST_ASSERT_LESS_OR_EQUAL_UINT32(PROFILE_PLAN_STEPS, s.plan.steps);
+            TEST_ASSERT_LESS_OR_EQUAL_INT16(PROFILE_PLAN_UNIT, s.beyond);
         }
     }
 }

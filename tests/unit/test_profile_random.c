@@ -607,11 +607,34 @@ static void look_back(void)
     }
 }
 
+/* The slices, of any length, make no difference to the plan (D-PRO-23). */
+static void plan_in_slices(uint8_t what)
+{
+    const profile_links_t links = s.links;
+    systems_plan(&s, what);
+    const profile_links_t planned = s.links;
+    const uint32_t steps = s.plan.steps;
+    uint8_t want[PDCP_CHANNELS_MAX];
+    memcpy(want, s.plan.want, sizeof want);
+    s.links = links;
+    s.slice = (int16_t)(1 + limb.seed * 7919u % 400u);
+    systems_plan(&s, what);
+    s.slice = 0;
+    check(memcmp(want, s.plan.want, sizeof want) == 0 && steps == s.plan.steps, "slices give another plan");
+    for (uint8_t e = 0; e < planned.count; e++) {
+        check(planned.entries[e].stand_in == s.links.entries[e].stand_in, "slices give another stand-in");
+    }
+}
+
 /* Plans, judges, carries out, and plans once more. */
 static uint32_t plan_and_check(uint8_t what)
 {
     look_back();
-    systems_plan(&s, what);
+    if (limb.seed % 4 == 0) {
+        plan_in_slices(what);
+    } else {
+        systems_plan(&s, what);
+    }
     check(s.plan.steps <= PROFILE_PLAN_STEPS, "too many steps");
     check_links();
     check_reasons();
@@ -797,15 +820,14 @@ static void enforce_naively(uint8_t *links)
 
 static void check_enforce(void)
 {
-    const profile_scene_t scene = systems_scene(&s);
     uint8_t links[PDCP_CHANNELS_MAX];
     look_back();
     memcpy(links, before, sizeof links);
     enforce_naively(links);
-    profile_plan_enforce(&s.plan, &scene);
+    systems_plan(&s, PROFILE_PLAN_ENFORCE);
     check(memcmp(links, s.plan.want, sizeof links) == 0, "enforce");
     systems_execute(&s);
-    profile_plan_enforce(&s.plan, &scene);
+    systems_plan(&s, PROFILE_PLAN_ENFORCE);
     check(memcmp(links, s.plan.want, sizeof links) == 0, "enforce twice");
     systems_execute(&s);
 }

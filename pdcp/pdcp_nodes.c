@@ -167,9 +167,9 @@ void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t 
     }
 }
 
-static uint8_t take_channel(pdcp_nodes_t *nodes, uint8_t node, uint8_t index)
+/* The first free one from number i on. */
+static uint8_t take_channel(pdcp_nodes_t *nodes, uint8_t node, uint8_t index, uint8_t i)
 {
-    uint8_t i = 0;
     while (nodes->channels[i].node != PDCP_NONE) {
         i++;
     }
@@ -192,9 +192,11 @@ bool pdcp_nodes_set_channels(pdcp_nodes_t *nodes, uint8_t node, uint8_t count)
     drop_needs(nodes, node);
     cut_channels(nodes, node, count);
     uint8_t *link = &owner->first_channel;
+    uint8_t from = 0;
     for (uint16_t index = 1; index <= count; index++) {
         if (*link == PDCP_NONE) {
-            *link = take_channel(nodes, node, (uint8_t)index);
+            *link = take_channel(nodes, node, (uint8_t)index, from);
+            from = *link;
         }
         link = &nodes->channels[*link].next;
     }

@@ -521,7 +521,7 @@ static void go_on(profile_plan_t *plan, phase_t done)
     uint8_t phase = (uint8_t)done;
     do {
         phase++;
-    } while ((plan->what & whats[phase]) == 0);
+    } while (phase < (uint8_t)PHASE_ROUND_END && (plan->what & whats[phase]) == 0);
     plan->phase = phase;
     plan->at = 0;
     plan->pass = 0;

@@ -173,7 +173,8 @@ static void expect_many(uint16_t count)
     TEST_ASSERT_EQUAL_UINT16(count, next);
 }
 
-/* The ring, then the FIFO with its 24 buffers; each frame beyond is counted. */
+/* D-MCU-1, D-MCU-5: the ring, 32 frames on the smaller part and 128 on the larger one, then the FIFO with its
+ * 24 buffers; each frame beyond is counted. */
 static void test_ring_and_fifo_hold_frames_and_count_what_they_lose(void)
 {
     const uint16_t held = PART_CAN_RX_PLACES + 24;

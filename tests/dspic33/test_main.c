@@ -101,9 +101,9 @@ static void step_world(void)
     }
 }
 
-/* Handlers wait until the part is awake, so not much may come at once. While the program starts, and idles
- * until the EEPROM has answered, the controller is not on the bus yet: nobody would take its frames, and who
- * sends them repeats them. */
+/* D-MCU-2: Handlers wait until the part is awake, so not much may come at once. While the program starts, and
+ * idles until the EEPROM has answered, the controller is not on the bus yet: nobody would take its frames,
+ * and who sends them repeats them. */
 static void on_idle(void)
 {
     if (fake.watchdog_kicks == 0) {

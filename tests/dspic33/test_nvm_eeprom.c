@@ -112,7 +112,8 @@ static void test_hung_bus_fails_and_recovers(void)
     TEST_ASSERT_TRUE(hal_nvm_read(nvm, 0, &byte, 1));
 }
 
-/* The processor alone was reset in the middle of a write: the EEPROM does not answer before it has ended. */
+/* D-MCU-3: The processor alone was reset in the middle of a write: the EEPROM does not answer before it has
+ * ended. */
 static void test_read_after_a_reset_waits_for_the_write_before_it(void)
 {
     hal_nvm_t *nvm = start(false);

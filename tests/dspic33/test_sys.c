@@ -52,6 +52,7 @@ static void test_crystal_that_does_not_start_is_noticed(void)
     TEST_ASSERT_FALSE(clock_start());
 }
 
+/* D-MCU-4: 0200h is the flag of the pin select registers. */
 static void test_cause_of_the_reset(void)
 {
     static const uint16_t flags[] = {0x0003, 0x0002, 0x0080, 0x0010, 0x4000, 0x0200, 0x0040, 0x8000};

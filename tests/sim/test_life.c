@@ -532,8 +532,8 @@ static limb_t *begin_case(void)
     return &limb;
 }
 
-/* The host takes away the link of a required input: what requires it rests, and comes back with it (D-PRO-9),
- * in a stored configuration, too. */
+/* The host takes away the link of a required input: what requires it rests, and comes back with it (D-PRO-9,
+ * D-PRO-25), in a stored configuration, too. */
 static void expect_that_it_is_missed(bool stored)
 {
     limb_t *limb = begin_case();

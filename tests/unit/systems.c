@@ -282,10 +282,11 @@ void systems_plan(systems_t *s, uint8_t what)
 {
     const profile_scene_t scene = systems_scene(s);
     profile_plan_begin(&s->plan, &scene, what);
-    const int16_t slice = s->slice != 0 ? s->slice : 30000;
+    const int16_t slice = (int16_t)(s->slice != 0 ? s->slice : 30000);
     while (!profile_plan_step(&s->plan, &scene, slice)) {
-        const int16_t beyond = (int16_t)-s->plan.left;
-        s->beyond = beyond > s->beyond ? beyond : s->beyond;
+        if (-s->plan.left > s->beyond) {
+            s->beyond = (int16_t)-s->plan.left;
+        }
     }
 }
 

@@ -296,7 +296,7 @@ static void test_the_stream_ends_with_its_host(void)
     TEST_ASSERT_EQUAL(0, app.api.events.mask);
 }
 
-/* What it has asked for and was not served yet is served, but for the stream. */
+/* D-API-17: What it has asked for and was not served yet is served, but for the stream. */
 static void test_no_stream_begins_when_its_host_is_gone(void)
 {
     exchange_add_output(&x, "FE");

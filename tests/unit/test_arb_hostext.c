@@ -259,7 +259,7 @@ static void write_long_string(uint8_t *string)
     static const uint8_t head[] = {1, 1, 0, 2, 3, 0, 3, 0, 0};
     uint8_t piece[4 + LONG] = {0, 0, LONG, 0};
     memcpy(string, head, sizeof head);
-    for (uint8_t at = sizeof head; at < LONG - 3; at = (uint8_t)(at + 3)) {
+    for (uint8_t at = sizeof head; at < (uint8_t)(LONG - 3); at = (uint8_t)(at + 3)) {
         string[at] = 0x80;
         string[at + 1] = at;
         string[at + 2] = 7;

@@ -16,6 +16,7 @@
 static char folder[] = "/tmp/test_linux_nvm.XXXXXX";
 static char path[64];
 static char error[200];
+static hal_nvm_t *contracted; /* the memory of the contract's tests */
 
 void setUp(void)
 {
@@ -27,6 +28,10 @@ void setUp(void)
 
 void tearDown(void)
 {
+    if (contracted != NULL) {
+        linux_nvm_close(contracted);
+        contracted = NULL;
+    }
     unlink(path);
     rmdir(folder);
 }
@@ -202,13 +207,14 @@ static void test_memory_without_a_file_starts_empty_each_time(void)
 /* The contract, on a file. */
 hal_nvm_t *nvm_contract_open(void)
 {
-    return open_good(path);
+    contracted = open_good(path);
+    return contracted;
 }
 
 hal_nvm_t *nvm_contract_reopen(hal_nvm_t *nvm)
 {
     linux_nvm_close(nvm);
-    return open_good(path);
+    return nvm_contract_open();
 }
 
 void nvm_contract_wait(void) {}

@@ -519,7 +519,8 @@ static void test_an_original_does_not_take_what_it_needs(void)
     expect("1.1>2.1 3.1>2.2");
 }
 
-/* 2.2 requires 2.1, which has the source that 5.1 had: a working original is not given up for another one. */
+/* 2.2 requires 2.1, which has the source that 5.1 had: a working original is not given up for
+ * another one (D-PRO-24). */
 static void test_an_original_does_not_cost_another_one(void)
 {
     run("D1 out 1 5000 2110; D2 in 1 5200 2110, in 2 5200 1110 req 1; D3 out 1 5000 1110; D4 out 1 5000 2120;"

@@ -17,13 +17,13 @@ void setUp(void)
 {
     hostlink_start(&x, &app, false);
     systems_init(&s);
-    for (uint8_t n = 1; n <= DEVICES; n++) {
+    for (uint8_t n = 1; n <= (uint8_t)DEVICES; n++) {
         systems_device_t device;
         memset(&device, 0, sizeof device);
         device.identity.sn = n;
         device.name = SYSTEMS_NAMES;
         device.count = 2 * HALF;
-        for (uint8_t i = 0; i < HALF; i++) {
+        for (uint8_t i = 0; i < (uint8_t)HALF; i++) {
             device.channels[i] = (systems_channel_t){
                 .transfer = PDCP_INPUT, .type = 0x5300, .profile = (uint16_t)(0x1100u + 0x100u * (n % 3u))};
             device.channels[HALF + i] =

@@ -265,7 +265,8 @@ uint32_t arb_hostapi_next_ms(const arb_hostapi_t *api, uint32_t now_ms)
     if (arb_hostrx_is_inside(&api->rx)) {
         next_ms = api->rx.last_ms + ARB_HOSTRX_TIMEOUT_MS;
     }
-    if (api->turn.waiting && pdcp_time_before(api->turn.until_ms, next_ms)) {
+    const bool blocked = api->answer_len != 0 || api->urgent_len != 0; /* until the host reads on */
+    if (api->turn.waiting && !blocked && pdcp_time_before(api->turn.until_ms, next_ms)) {
         next_ms = api->turn.until_ms;
     }
     return next_ms;

@@ -65,6 +65,23 @@ static const char *bus_state_name(int8_t state)
     return names[state];
 }
 
+static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
+{
+    const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
+    const pdcp_channel_t *input = &nodes->channels[event->channel];
+    const pdcp_identity_t *to = &nodes->nodes[input->node].identity;
+    const pdcp_identity_t *from = &input->source;
+    const char *outcome = event->status == PDCP_OK ? "" : ", could not be made";
+    if (input->link == PDCP_LINK_NONE) {
+        say(daemon, PDCPD_LOG_INFO, "%u:%u:%u.%u is unlinked%s", to->vid, to->pid, to->sn, input->index,
+            outcome);
+        return;
+    }
+    say(daemon, PDCPD_LOG_INFO, "%u:%u:%u.%u -> %u:%u:%u.%u is %s%s", from->vid, from->pid, from->sn,
+        input->source_index, to->vid, to->pid, to->sn, input->index,
+        input->link == PDCP_LINK_ACTIVE ? "active" : "inactive", outcome);
+}
+
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
 {
     const daemon_t *daemon = ctx;
@@ -109,9 +126,7 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
         say(daemon, PDCPD_LOG_WARNING, "bus state: %s", bus_state_name(event->status));
         break;
     case PDCP_EVENT_LINK:
-        say(daemon, PDCPD_LOG_INFO, "%s channel %u: link status %u%s", name,
-            nodes->channels[event->channel].index, nodes->channels[event->channel].link,
-            event->status == PDCP_OK ? "" : ", could not be made");
+        say_link(daemon, event);
         break;
     default:
         break;

@@ -149,7 +149,8 @@ static int on_key(void *ctx, const char *section, const char *name, const char *
         return 0;
     }
     if (!set_key(&file->options, name, value)) {
-        (void)snprintf(file->error, sizeof file->error, "'%s = %s' is no option of pdcpd", name, value);
+        (void)snprintf(file->error, sizeof file->error,
+                       "'%s = %s': pdcpd has no such option, or not with this value", name, value);
         return 0;
     }
     return 1;

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-enum { TURNS_MAX = 10000 }; /* of the application at one time: more is an error of its own */
+enum { TURNS_MAX = 1000 }; /* of the application at one time: more is an error of its own */
 
 void sim_world_init(sim_world_t *world, uint64_t now_us, uint32_t clock_ms)
 {

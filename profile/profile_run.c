@@ -529,11 +529,12 @@ void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored)
 
 bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb)
 {
-    bool any_ready = false;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        any_ready = any_ready || nodes_of(arb)->nodes[i].state == PDCP_NODE_READY;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_WAITING; i++) {
+        if (nodes_of(arb)->nodes[i].state == PDCP_NODE_READY) {
+            return true;
+        }
     }
-    return run->state == PROFILE_WAITING && any_ready;
+    return false;
 }
 
 bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)

@@ -70,6 +70,7 @@ def test_ipecmd(tmp_path: Path, image: Path) -> None:
 
 def test_mdb_where_ipecmd_is_missing(tmp_path: Path, image: Path) -> None:
     install(tmp_path, "bin/mdb.sh")
+    image = image.rename(tmp_path / "moved.hex")
     result = run(tmp_path, "--tool", "pickit3", "--part", "33EP512MU810", image)
     assert result.returncode == 0, result.stderr
     script = (tmp_path / "log.script").read_text().splitlines()
@@ -80,6 +81,7 @@ def test_mdb_where_ipecmd_is_missing(tmp_path: Path, image: Path) -> None:
 def test_serial_number(tmp_path: Path, image: Path, part: str, address: int) -> None:
     """The low words of the instructions at an address, which counts two bytes; the rest of the image stays."""
     install(tmp_path, "mplab_ipe/ipecmd.sh")
+    image = image.rename(tmp_path / "moved.hex")
     result = run(tmp_path, "--serial", str(0x89ABCDEF), "--part", part, image)
     assert result.returncode == 0, result.stderr
     text = (tmp_path / "log.hex").read_text()
@@ -87,6 +89,27 @@ def test_serial_number(tmp_path: Path, image: Path, part: str, address: int) -> 
     assert text.count(END) == 1
     serial = bytes.fromhex("EFCD0000AB890000")
     assert hex_bytes(text) == hex_bytes(IMAGE) | {2 * address + i: value for i, value in enumerate(serial)}
+
+
+def test_part_of_another_folder(tmp_path: Path, image: Path) -> None:
+    install(tmp_path, "mplab_ipe/ipecmd.sh")
+    result = run(tmp_path, "--part", "33EP512MU810", image)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "dspic33fj64mc802" in result.stderr and "--part 33EP512MU810" in result.stderr
+
+
+def test_image_without_data(tmp_path: Path, image: Path) -> None:
+    image.write_text(END, encoding="ascii")
+    result = run(tmp_path, image)
+    assert (result.returncode, result.stdout) == (2, "")
+    assert "without any data" in result.stderr
+
+
+def test_dry_run_with_nothing_installed(tmp_path: Path, image: Path) -> None:
+    result = run(tmp_path, "--dry-run", image, MPLABX_ROOT="", PATH="/usr/bin:/bin")
+    assert result.returncode == 0, result.stderr
+    assert result.stdout == f"ipecmd.sh -TPPK4 -P33FJ64MC802 -F{image} -M -OL\n"
+    assert "neither ipecmd.sh nor mdb.sh was found" in result.stderr
 
 
 @pytest.mark.parametrize("variables", [{"FLASH_STATUS": "36"}, {"FLASH_SAYS": "Target not found"}])

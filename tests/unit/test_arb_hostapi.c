@@ -525,6 +525,24 @@ static void test_an_output_for_its_own_device(void)
     expect_error(0x2309, 0x0F);
 }
 
+/* A request whose waiting is over, behind an answer that the host does not take: nothing to be done at once,
+ * again and again. */
+static void test_a_host_that_does_not_read_costs_no_time(void)
+{
+    add_devices();
+    exchange_rx(&x, "613#01 0200 0200 0700"); /* its setup is waited for */
+    hostlink_room(0);
+    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    for (int i = 0; i < 4; i++) {
+        ask(0x2201, NULL, 0); /* the last one is the fifth */
+    }
+    TEST_ASSERT_TRUE(app.api.turn.waiting);
+    TEST_ASSERT_EQUAL(1, app.api.busy);
+    exchange_wait(&x, 2100);
+    (void)exchange_drain(&x);
+    TEST_ASSERT_GREATER_THAN_INT32(0, (int32_t)(arb_app_step(&app, x.now_ms) - x.now_ms));
+}
+
 /* --- bulk transfer --- */
 
 static void to_text(char *text, const uint8_t *bytes, uint16_t len)
@@ -789,6 +807,7 @@ int main(void)
     RUN_TEST(test_sole_access);
     RUN_TEST(test_an_output_without_a_node_id);
     RUN_TEST(test_an_output_for_its_own_device);
+    RUN_TEST(test_a_host_that_does_not_read_costs_no_time);
     RUN_TEST(test_a_value_of_512_bytes_is_read);
     RUN_TEST(test_a_value_of_512_bytes_is_written);
     RUN_TEST(test_a_device_vanishes_while_it_is_read);

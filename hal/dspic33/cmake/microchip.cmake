@@ -16,7 +16,7 @@ foreach(tool gcc ar ranlib bin2hex)
         HINTS ${PDCP_COMPILER_PLACES} ${PDCP_COMPILER_VERSIONS} PATH_SUFFIXES bin NO_CMAKE_FIND_ROOT_PATH)
     if(NOT PDCP_${variable} AND NOT tool STREQUAL ranlib)
         message(FATAL_ERROR
-            "${PDCP_COMPILER_NAME}-${tool} was not found: install Microchip's ${PDCP_COMPILER_NAME}, or say where it is with XC16_ROOT or XC_DSC_ROOT")
+            "${PDCP_COMPILER_NAME}-${tool} was not found: install Microchip's ${PDCP_COMPILER_NAME}, or say where it is with ${PDCP_COMPILER_ROOT}; each of XC16 and XC-DSC has presets of its own")
     endif()
 endforeach()
 

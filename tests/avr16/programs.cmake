@@ -4,7 +4,7 @@
 # (target/prelude.h).
 set(avr16_parts_test_acceptance 1)
 set(avr16_parts_test_arb_app 6)
-set(avr16_parts_test_arb_hostapi 32)
+set(avr16_parts_test_arb_hostapi 33)
 set(avr16_parts_test_arb_hostevents 4)
 set(avr16_parts_test_arb_hostext 26)
 set(avr16_parts_test_pdcp_device 5)

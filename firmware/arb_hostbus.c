@@ -4,7 +4,7 @@
 
 #include "arb_hostcall.h"
 #include "pdcp_time.h"
-#include "profile_type.h"
+#include "profile_match.h"
 
 enum { PASSTHROUGH = 15 }; /* bytes of the payload: dev, DLC, data */
 
@@ -140,13 +140,6 @@ static uint8_t set_parameter(arb_call_t *call)
     return parameter(call, true);
 }
 
-static bool is_sole_access(const pdcp_channel_t *input)
-{
-    profile_type_t type;
-    (void)profile_type_decode(input->type, &type);
-    return type.sole_access;
-}
-
 static bool is_fed_by(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, uint8_t output)
 {
     const pdcp_channel_t *source = &nodes->channels[output];
@@ -160,13 +153,13 @@ static bool is_fed_by(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, ui
 static bool breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
 {
     const pdcp_channel_t *channel = &nodes->channels[input];
-    if (!is_sole_access(channel) || is_fed_by(nodes, channel, output) ||
+    if (!profile_is_sole(channel) || is_fed_by(nodes, channel, output) ||
         channel->node == nodes->channels[output].node) {
         return false;
     }
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *other = &nodes->channels[i];
-        if (i != input && is_fed_by(nodes, other, output) && is_sole_access(other)) {
+        if (i != input && is_fed_by(nodes, other, output) && profile_is_sole(other)) {
             return true;
         }
     }
@@ -294,16 +287,6 @@ static uint8_t passthrough(arb_call_t *call)
     return status == PDCP_OK ? arb_call_started_limited(call) : (uint8_t)ARB_ERR_BUSY;
 }
 
-static void set_bit(uint8_t *bits, uint8_t number)
-{
-    bits[number / 8] = (uint8_t)(bits[number / 8] | (uint8_t)(1u << (number % 8)));
-}
-
-static bool has_bit(const uint8_t *bits, uint8_t number)
-{
-    return (bits[number / 8] & (1u << (number % 8))) != 0;
-}
-
 static void start_resets(arb_call_t *call, uint8_t number)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
@@ -314,7 +297,7 @@ static void start_resets(arb_call_t *call, uint8_t number)
         }
         rank++;
         if (number == 0 || number == rank) {
-            set_bit(call->turn->asked, place);
+            profile_set_bit(call->turn->asked, place, true);
             call->turn->open++;
             (void)pdcp_arb_reset(call->arb, call->now_ms, place);
         }
@@ -351,9 +334,9 @@ void arb_hostbus_reset_results(const arb_call_t *call, uint8_t *results)
     const arb_turn_t *turn = call->turn;
     uint8_t number = call->payload[0] == 0 ? 0 : (uint8_t)(call->payload[0] - 1);
     for (uint8_t place = 0; place < PDCP_DEVICES_MAX; place++) {
-        if (has_bit(turn->asked, place)) {
-            if (has_bit(turn->reset, place)) {
-                set_bit(results, number);
+        if (profile_bit(turn->asked, place)) {
+            if (profile_bit(turn->reset, place)) {
+                profile_set_bit(results, number, true);
             }
             number++;
         }
@@ -370,7 +353,7 @@ static void on_reset(arb_turn_t *turn, const pdcp_event_t *event)
     }
     turn->open--;
     if (event->status == PDCP_OK) {
-        set_bit(turn->reset, event->node);
+        profile_set_bit(turn->reset, event->node, true);
     }
 }
 

@@ -67,6 +67,10 @@ void exchange_run(exchange_t *x, const exchange_pair_t *pairs);
 void exchange_add_output(exchange_t *x, const char *out_id);
 void exchange_add_input(exchange_t *x);
 
+/* The link of that output to that input being made (pdcp-bus.md 8): 5, 6, 8, 7 and enabled to the input, then
+ * enabled to the output. */
+extern const exchange_pair_t exchange_making[];
+
 /* The beacon of these devices, so that they stay alive. */
 void exchange_beacons(exchange_t *x);
 

@@ -208,20 +208,11 @@ static void test_a_device_that_dies_meanwhile(void)
 
 static void test_a_link_is_configured_and_listed(void)
 {
-    static const exchange_pair_t making[] = {
-        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01"},
-        {"312#04 04 01 01", "212#84 01 04 01"},
-        {"311#04 04 01 01", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
     ask(0x2307, 7, BYTES(DEV_OUT, 1, DEV_IN, 1));
     hostlink_silence();
-    exchange_run(&x, making);
+    exchange_run(&x, exchange_making);
     hostlink_answer(0x2308, 7, BYTES(2));
     ask(0x2201, 8, NULL, 0);
     hostlink_answer(0x2202, 8, BYTES(2, 1, 1, 1));

@@ -110,17 +110,8 @@ static void test_bytes_of_parameters(void)
 /* [API 3.3.14] to [API 3.3.16], [API 3.3.23] to [API 3.3.25] */
 static void test_bytes_of_links(void)
 {
-    static const exchange_pair_t making[] = {
-        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01"},
-        {"312#04 04 01 01", "212#84 01 04 01"},
-        {"311#04 04 01 01", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     static const row_t rows[] = {
-        {"FE 19 07 23 0D 1B 10 00 02 00 02 00 04 00 01 02 00 02 00 06 00 01 45 35", making,
+        {"FE 19 07 23 0D 1B 10 00 02 00 02 00 04 00 01 02 00 02 00 06 00 01 45 35", exchange_making,
          "FE 19 08 23 0D 43 03 00 02 B2 C1"},
         {"FE 19 0D 22 0E 05 03 00 01 D1 F1", NULL,
          "FE 19 0E 22 0E DE 11 00 02 00 02 00 04 00 01 02 00 02 00 06 00 01 02 B4 03"},
@@ -735,15 +726,6 @@ static void test_a_slow_device_is_written(void)
 /* The same with a link: every write is answered at the last moment. It is undone, and can be made after. */
 static void expect_that_it_is_undone(uint32_t quiet_ms)
 {
-    static const exchange_pair_t making[] = {
-        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01"},
-        {"312#04 04 01 01", "212#84 01 04 01"},
-        {"311#04 04 01 01", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     int ms = 0;
     int k = 0;
     add_devices();
@@ -753,7 +735,7 @@ static void expect_that_it_is_undone(uint32_t quiet_ms)
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
     while (!answered_within(1400, &ms, 0x2309, 0x05)) {
         exchange_beacons(&x);
-        exchange_rx(&x, making[k++].rx);
+        exchange_rx(&x, exchange_making[k++].rx);
     }
     TEST_ASSERT_EQUAL(3000, ms);
     TEST_ASSERT_EQUAL(2, k);
@@ -764,7 +746,7 @@ static void expect_that_it_is_undone(uint32_t quiet_ms)
     (void)exchange_drain(&x);
     TEST_ASSERT_EQUAL(0, hostlink_waiting());
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
-    exchange_run(&x, making);
+    exchange_run(&x, exchange_making);
     expect(0x2308, BYTES(2));
     TEST_ASSERT_EQUAL(0, hostlink_waiting());
 }

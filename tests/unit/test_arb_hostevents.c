@@ -69,17 +69,8 @@ static void test_devices_come_and_go(void)
 
 static void make_link(void)
 {
-    static const exchange_pair_t making[] = {
-        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01"},
-        {"312#04 04 01 01", "212#84 01 04 01"},
-        {"311#04 04 01 01", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     hostlink_ask(&x, 0x2307, 7, BYTES(DEV_OUT, 1, DEV_IN, 1));
-    exchange_run(&x, making);
+    exchange_run(&x, exchange_making);
 }
 
 /* Also which output it was, when a link is gone. */

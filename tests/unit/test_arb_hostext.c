@@ -335,19 +335,10 @@ static void test_the_active_configuration_is_written_away(void)
 
 static void make_link(void)
 {
-    static const exchange_pair_t making[] = {
-        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01"},
-        {"312#04 04 01 01", "212#84 01 04 01"},
-        {"311#04 04 01 01", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
-    exchange_run(&x, making);
+    exchange_run(&x, exchange_making);
     expect(0x2308, BYTES(2));
 }
 
@@ -382,9 +373,7 @@ static void live(uint32_t ms)
         }
         exchange_wait(&x, 1);
         (void)exchange_drain(&x);
-        do {
-            arb_app_step(&app, x.now_ms);
-        } while (app.limb.run.making); /* a plan takes several steps */
+        exchange_step(&x);
         TEST_ASSERT_TRUE_MESSAGE((int32_t)(app.next_ms - x.now_ms) > 0, "wants to be called at once");
     }
 }

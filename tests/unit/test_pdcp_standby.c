@@ -182,15 +182,6 @@ static void test_a_stranger_with_a_kept_id_is_told_to_reset(void)
 /* D-BUS-26: a remembered link whose making was not answered is tried again after 500 ms. */
 static void test_a_link_that_was_not_answered_is_tried_again(void)
 {
-    static const exchange_pair_t pairs[] = {
-        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01"},
-        {"312#04 04 01 01", "212#84 01 04 01"},
-        {"311#04 04 01 01", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
     exchange_rx(&x, "212#0F 01");
@@ -208,7 +199,7 @@ static void test_a_link_that_was_not_answered_is_tried_again(void)
     exchange_pass(&x, 499);
     exchange_silence(&x);
     exchange_pass(&x, 1);
-    exchange_run(&x, pairs);
+    exchange_run(&x, exchange_making);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE,
                       x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)].link);
 }

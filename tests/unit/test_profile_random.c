@@ -869,8 +869,8 @@ static void check_clear(void)
 
 static void test_enforce_save_and_load_clear(void)
 {
-    for (uint32_t n = 0; n < SMALL_LIMBS; n++) {
-        make_limb(first_of(SMALL_LIMBS) + n, DEVICES, CHANNELS, LINKS);
+    for (uint32_t n = 0; n < LIMBS; n++) {
+        make_limb(first_of(LIMBS) + n, DEVICES, CHANNELS, LINKS);
         start(chance(50));
         systems_plan(&s, PROFILE_PLAN_ALL);
         link_anything();

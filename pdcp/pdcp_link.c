@@ -33,9 +33,15 @@ static pdcp_channel_t *channel_of(pdcp_bus_t *bus, uint8_t channel)
     return channel != PDCP_NONE ? &bus->nodes.channels[channel] : NULL;
 }
 
+/* Place of the device that a channel belongs to; PDCP_NONE stands for no channel, too. */
+static uint8_t owner_of(const pdcp_bus_t *bus, uint8_t channel)
+{
+    return channel != PDCP_NONE ? bus->nodes.channels[channel].node : (uint8_t)PDCP_NONE;
+}
+
 static bool is_ready(const pdcp_bus_t *bus, uint8_t channel)
 {
-    const uint8_t node = channel != PDCP_NONE ? bus->nodes.channels[channel].node : PDCP_NONE;
+    const uint8_t node = owner_of(bus, channel);
     return node != PDCP_NONE && bus->nodes.nodes[node].state == PDCP_NODE_READY;
 }
 
@@ -46,8 +52,9 @@ static bool is_unconnected(const pdcp_channel_t *input)
 
 /* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing
  * to be made. */
-static void put_todo(pdcp_bus_t *bus, pdcp_channel_t *channel, pdcp_todo_t todo)
+static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
+    pdcp_channel_t *channel = &bus->nodes.channels[number];
     if (channel->todo != PDCP_TODO_REMOVE) {
         channel->todo = (uint8_t)todo;
     }
@@ -72,7 +79,7 @@ static bool output_is_needed(const pdcp_bus_t *bus, uint8_t output)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &bus->nodes.channels[i];
-        if (input->node != PDCP_NONE && input->feed == output && input->link == PDCP_LINK_ACTIVE) {
+        if (input->feed == output && input->link == PDCP_LINK_ACTIVE) {
             return true;
         }
     }
@@ -84,7 +91,7 @@ static void release_output(pdcp_bus_t *bus, uint8_t output)
 {
     if (is_ready(bus, output) && bus->nodes.channels[output].transfer == PDCP_OUTPUT &&
         bus->nodes.channels[output].enabled && !output_is_needed(bus, output)) {
-        put_todo(bus, &bus->nodes.channels[output], PDCP_TODO_SILENCE);
+        put_todo(bus, output, PDCP_TODO_SILENCE);
     }
 }
 
@@ -106,12 +113,14 @@ bool pdcp_link_wish_waits(const pdcp_bus_t *bus)
 
 void pdcp_link_remove(pdcp_bus_t *bus, uint8_t input)
 {
-    put_todo(bus, &bus->nodes.channels[input], PDCP_TODO_REMOVE);
+    put_todo(bus, input, PDCP_TODO_REMOVE);
 }
 
-static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, uint8_t result)
+static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, bool connected)
 {
-    const pdcp_msg_t msg = {.code = PDCP_UPDATE_CHANNEL | PDCP_ANSWER, .result = result, .channel = index};
+    const pdcp_msg_t msg = {.code = PDCP_UPDATE_CHANNEL | PDCP_ANSWER,
+                            .result = connected ? PDCP_SUCCESS : PDCP_FAILURE,
+                            .channel = index};
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, bus->nodes.nodes[node].node_id, &msg);
 }
 
@@ -119,54 +128,42 @@ void pdcp_link_on_update(pdcp_bus_t *bus, uint8_t node, uint8_t index)
 {
     const uint8_t number = pdcp_nodes_channel(&bus->nodes, node, index);
     const uint8_t state = bus->nodes.nodes[node].state;
-    if (state == PDCP_NODE_SETUP) {
-        if (number != PDCP_NONE) {
-            put_todo(bus, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
-        }
+    if (state == PDCP_NODE_SETUP && number == PDCP_NONE) {
         return; /* without a channel yet: the device asks again */
     }
-    if (state != PDCP_NODE_READY || number == PDCP_NONE ||
-        bus->nodes.channels[number].transfer != PDCP_INPUT) {
-        answer_update(bus, node, index, PDCP_FAILURE);
-        return;
+    if (state == PDCP_NODE_SETUP || (state == PDCP_NODE_READY && number != PDCP_NONE &&
+                                     bus->nodes.channels[number].transfer == PDCP_INPUT)) {
+        put_todo(bus, number, PDCP_TODO_UPDATE);
+    } else {
+        answer_update(bus, node, index, false);
     }
-    put_todo(bus, &bus->nodes.channels[number], PDCP_TODO_UPDATE);
 }
 
 void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && !bus->link.planned; i++) {
         pdcp_channel_t *input = &bus->nodes.channels[i];
-        if (input->node == PDCP_NONE || input->link != PDCP_LINK_INACTIVE) {
+        if (input->link != PDCP_LINK_INACTIVE) {
             continue;
         }
         input->feed = find_source(bus, input);
-        const bool concerned = node == PDCP_NONE || input->node == node ||
-                               (input->feed != PDCP_NONE && bus->nodes.channels[input->feed].node == node);
-        if (concerned && input->feed != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
-            put_todo(bus, input, PDCP_TODO_CONNECT);
+        const uint8_t source = owner_of(bus, input->feed);
+        const bool concerned = node == PDCP_NONE || input->node == node || source == node;
+        if (concerned && source != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
+            put_todo(bus, i, PDCP_TODO_CONNECT);
         }
     }
     bus->link.due = true; /* an Update Data Channel may have waited for the end of the setup */
 }
 
-/* The input's own end of a link is gone, or its source is. */
-static void deactivate(pdcp_bus_t *bus, uint8_t number, bool input_gone)
-{
-    pdcp_channel_t *input = &bus->nodes.channels[number];
-    input->link = PDCP_LINK_INACTIVE;
-    if (input_gone) {
-        release_output(bus, input->feed);
-    } else {
-        put_todo(bus, input, PDCP_TODO_SILENCE);
-    }
-    pdcp_bus_tell(bus, PDCP_EVENT_LINK, input->node, number, PDCP_OK);
-}
-
+/* A link rests: its input is silenced, and its output when nobody else listens. */
 void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
 {
-    deactivate(bus, input, false);
-    release_output(bus, bus->nodes.channels[input].feed);
+    pdcp_channel_t *channel = &bus->nodes.channels[input];
+    channel->link = PDCP_LINK_INACTIVE;
+    put_todo(bus, input, PDCP_TODO_SILENCE);
+    release_output(bus, channel->feed);
+    pdcp_bus_tell(bus, PDCP_EVENT_LINK, channel->node, input, PDCP_OK);
 }
 
 static void give_back_old(const pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -185,18 +182,17 @@ static void leave_job(pdcp_bus_t *bus, uint8_t node)
     if (!bus->link.active) {
         return;
     }
-    if (bus->link.input != PDCP_NONE && bus->nodes.channels[bus->link.input].node == node) {
+    if (owner_of(bus, bus->link.input) == node) {
         if (!bus->link.undoing) {
             give_back_old(bus, &bus->nodes.channels[bus->link.input]);
         }
         bus->link.input = PDCP_NONE;
     }
-    if (bus->link.output != PDCP_NONE && bus->nodes.channels[bus->link.output].node == node) {
+    if (owner_of(bus, bus->link.output) == node) {
         bus->link.output = PDCP_NONE;
     }
     if (bus->link.at == node) {
         bus->link.at = PDCP_NONE;
-        bus->link.waiting = true;
     }
 }
 
@@ -217,76 +213,31 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &bus->nodes.channels[i];
-        if (channel->node == PDCP_NONE) {
-            continue;
-        }
         const bool own = channel->node == node;
-        const bool fed = channel->feed != PDCP_NONE && bus->nodes.channels[channel->feed].node == node;
-        if (own) {
+        if (channel->link == PDCP_LINK_ACTIVE && (own || owner_of(bus, channel->feed) == node)) {
+            pdcp_link_rest(bus, i);
+        }
+        if (own) { /* nothing can be written to it */
             channel->enabled = false;
             channel->todo = PDCP_TODO_NONE;
         }
-        if (channel->link == PDCP_LINK_ACTIVE && (own || fed)) {
-            deactivate(bus, i, own);
-        }
     }
     leave_job(bus, node);
-    if (bus->link.wish_input != PDCP_NONE && (bus->nodes.channels[bus->link.wish_input].node == node ||
-                                              bus->nodes.channels[bus->link.wish_output].node == node)) {
+    if (bus->link.wish_input != PDCP_NONE &&
+        (owner_of(bus, bus->link.wish_input) == node || owner_of(bus, bus->link.wish_output) == node)) {
         wish_ends(bus, PDCP_ERR_NO_ANSWER); /* its channels may be others' before its turn */
     }
 }
 
-static bool is_input_step(uint8_t step)
+/* The channel that the current step is about. */
+static uint8_t target_of(const pdcp_bus_t *bus)
 {
-    return step != STEP_OUTPUT_ON;
+    return bus->link.step == STEP_OUTPUT_ON ? bus->link.output : bus->link.input;
 }
 
-/* What a step writes: the parameter, and its value in bytes[]. Returns the length; 0: nothing is to be
- * written. */
-static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
+static void take_old(pdcp_bus_t *bus)
 {
-    const pdcp_channel_t *input = channel_of(bus, bus->link.input);
-    const pdcp_channel_t *output = channel_of(bus, bus->link.output);
-    memset(bytes, 0, PDCP_VALUE_MAX);
-    switch ((step_t)bus->link.step) {
-    case STEP_INPUT_OFF:
-        *param = PDCP_CH_ENABLED;
-        return input->enabled && !bus->link.undoing ? 1 : 0;
-    case STEP_VID_PID:
-        *param = PDCP_IN_SOURCE_VID_PID;
-        pdcp_put_u16(&bytes[0], input->source.vid);
-        pdcp_put_u16(&bytes[2], input->source.pid);
-        return 4;
-    case STEP_SERIAL:
-        *param = PDCP_IN_SOURCE_SERIAL;
-        pdcp_put_u16(&bytes[0], input->source.sn);
-        bytes[2] = input->source_index;
-        return 3;
-    case STEP_TYPE:
-        *param = PDCP_IN_SOURCE_TYPE;
-        pdcp_put_u16(&bytes[0], input->source_type);
-        pdcp_put_u16(&bytes[2], input->source_profile);
-        return 4;
-    case STEP_NODES:
-        *param = PDCP_IN_SOURCE_NODES;
-        if (!bus->link.undoing) {
-            bytes[0] = bus->nodes.nodes[output->node].node_id;
-            bytes[1] = output->node_id;
-        }
-        return 2;
-    case STEP_INPUT_ON:
-    case STEP_OUTPUT_ON:
-        *param = PDCP_CH_ENABLED;
-        bytes[0] = bus->link.undoing ? 0 : 1;
-        return bus->link.step == STEP_OUTPUT_ON && bus->link.output_was_on ? 0 : 1;
-    default:
-        return 0;
-    }
-}
-
-static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
-{
+    const pdcp_channel_t *input = &bus->nodes.channels[bus->link.input];
     bus->link.old_source = input->source;
     bus->link.old_index = input->source_index;
     bus->link.old_type = input->source_type;
@@ -297,8 +248,8 @@ static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
 
 static void name_source(pdcp_bus_t *bus)
 {
-    pdcp_channel_t *input = channel_of(bus, bus->link.input);
-    const pdcp_channel_t *output = channel_of(bus, bus->link.output);
+    pdcp_channel_t *input = &bus->nodes.channels[bus->link.input];
+    const pdcp_channel_t *output = &bus->nodes.channels[bus->link.output];
     input->source = bus->nodes.nodes[output->node].identity;
     input->source_index = output->index;
     input->source_type = output->type;
@@ -308,21 +259,32 @@ static void name_source(pdcp_bus_t *bus)
     bus->link.output_was_on = output_is_needed(bus, bus->link.output); /* enabled alone means: may be */
 }
 
-static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t output, step_t step)
+/* Begins a job at its first step; making a link names its source at once. What takes away runs through all
+ * steps backwards, and leaves out those that its channels do not have. */
+static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t output)
 {
     bus->link.active = true;
-    bus->link.waiting = true;
     bus->link.at = PDCP_NONE;
     bus->link.kind = (uint8_t)kind;
     bus->link.input = input;
     bus->link.output = output;
-    bus->link.step = (uint8_t)step;
-    bus->link.undoing = kind != PDCP_TODO_CONNECT && kind != PDCP_TODO_UPDATE;
+    bus->link.step = STEP_OUTPUT_ON;
+    bus->link.undoing = true;
     bus->link.once = false;
     bus->link.for_host = false;
-    bus->link.again = false;
     bus->link.output_was_on = false;
     bus->link.status = PDCP_OK;
+    if (input != PDCP_NONE) {
+        take_old(bus);
+    }
+    if (kind == PDCP_TODO_CONNECT) {
+        bus->link.step = STEP_INPUT_OFF;
+        bus->link.undoing = false;
+        name_source(bus);
+    } else if (kind == PDCP_TODO_UPDATE) {
+        bus->link.step = STEP_READ_VID_PID;
+        bus->link.undoing = false;
+    }
 }
 
 static void tell_link(pdcp_bus_t *bus)
@@ -337,10 +299,11 @@ static void tell_link(pdcp_bus_t *bus)
 }
 
 /* What must not go on hearing or sending is told so until it answers or its device is lost. */
-static void silence_again(pdcp_bus_t *bus, pdcp_channel_t *channel)
+static void silence_again(pdcp_bus_t *bus, uint8_t number)
 {
+    const pdcp_channel_t *channel = channel_of(bus, number);
     if (channel != NULL && channel->enabled && channel->todo == PDCP_TODO_NONE) {
-        put_todo(bus, channel, PDCP_TODO_AGAIN);
+        put_todo(bus, number, PDCP_TODO_AGAIN);
     }
 }
 
@@ -353,7 +316,7 @@ static void settle_failed(pdcp_bus_t *bus)
     if (bus->link.output_was_on) {
         release_output(bus, bus->link.output); /* whose other listeners may be gone meanwhile */
     } else {
-        silence_again(bus, channel_of(bus, bus->link.output));
+        silence_again(bus, bus->link.output);
     }
     if (bus->link.old_feed != bus->link.output) {
         release_output(bus, bus->link.old_feed);
@@ -363,28 +326,26 @@ static void settle_failed(pdcp_bus_t *bus)
     }
     input->feed = input->link != PDCP_LINK_NONE ? find_source(bus, input) : PDCP_NONE;
     if (bus->link.old_link == PDCP_LINK_ACTIVE) {
-        put_todo(bus, input, PDCP_TODO_CONNECT);
+        put_todo(bus, bus->link.input, PDCP_TODO_CONNECT);
     } else if (input->link == PDCP_LINK_INACTIVE && bus->link.status == PDCP_ERR_NO_ANSWER &&
                !bus->link.planned) {
         pdcp_bus_wake(bus, PDCP_TIMER_LINK, PDCP_LINK_PAUSE_MS); /* D-BUS-26 */
     }
-    silence_again(bus, input);
+    silence_again(bus, bus->link.input);
 }
 
 static void settle_made(pdcp_bus_t *bus)
 {
     bus->nodes.channels[bus->link.input].link = PDCP_LINK_ACTIVE;
-    if (bus->link.old_feed != bus->link.output) {
-        release_output(bus, bus->link.old_feed);
-    }
+    release_output(bus, bus->link.old_feed); /* unless it is the same: that one is needed */
 }
 
 static void settle_silenced(pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = channel_of(bus, bus->link.input);
     if (bus->link.status == PDCP_ERR_NO_ANSWER) {
-        silence_again(bus, input);
-        silence_again(bus, channel_of(bus, bus->link.output));
+        silence_again(bus, bus->link.input);
+        silence_again(bus, bus->link.output);
     }
     if (input != NULL && bus->link.kind == PDCP_TODO_REMOVE) {
         input->link = PDCP_LINK_NONE;
@@ -408,8 +369,7 @@ static void end(pdcp_bus_t *bus)
     }
     const bool unread = bus->link.status == PDCP_ERR_NO_ANSWER && bus->link.step <= STEP_READ_SERIAL;
     if (bus->link.kind == PDCP_TODO_UPDATE && input != NULL && !unread) { /* else the device asks again */
-        answer_update(bus, input->node, input->index,
-                      bus->link.status == PDCP_OK ? PDCP_SUCCESS : PDCP_FAILURE);
+        answer_update(bus, input->node, input->index, bus->link.status == PDCP_OK);
     }
     tell_link(bus);
 }
@@ -428,7 +388,6 @@ static void give_up(pdcp_bus_t *bus, pdcp_status_t status)
         return;
     }
     bus->link.undoing = true;
-    bus->link.last_step = STEP_VID_PID;
 }
 
 /* Update Data Channel, once 5 and 6 are read: is the source that they name on the bus? False: the job is
@@ -441,12 +400,10 @@ static bool resolve(pdcp_bus_t *bus)
         return false;
     }
     input->link = is_unconnected(input) ? PDCP_LINK_NONE : PDCP_LINK_INACTIVE;
-    take_old(bus, input);
+    take_old(bus);
     if (bus->link.output == PDCP_NONE) {
-        input->feed = PDCP_NONE;
-        release_output(bus, bus->link.old_feed);
         if (input->enabled) {
-            put_todo(bus, input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
+            put_todo(bus, bus->link.input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
         }
         bus->link.status = PDCP_ERR_UNKNOWN;
         return false;
@@ -455,46 +412,91 @@ static bool resolve(pdcp_bus_t *bus)
     return true;
 }
 
-/* Moves to the step that comes next in the job's direction. False: there is none. */
-static bool advance(pdcp_bus_t *bus)
+/* Goes on to the step that comes next in the job's direction; behind the last one the job is over. */
+static void advance(pdcp_bus_t *bus)
 {
+    const bool silences = bus->link.kind == PDCP_TODO_SILENCE || bus->link.kind == PDCP_TODO_AGAIN;
+    uint8_t last = STEP_OUTPUT_ON;
     if (bus->link.undoing) {
-        if (bus->link.step <= bus->link.last_step) {
-            return false;
-        }
-        bus->link.step--;
-        return true;
+        last = silences ? STEP_NODES : STEP_VID_PID;
     }
-    bus->link.step++;
-    return bus->link.step != STEP_END;
+    if (bus->link.step == last) {
+        end(bus);
+    } else if (bus->link.undoing) {
+        bus->link.step--;
+    } else {
+        bus->link.step++;
+    }
 }
 
 /* Can the current step be carried out on its device? */
 static bool step_possible(const pdcp_bus_t *bus)
 {
-    const bool needs_output =
-        bus->link.step == STEP_OUTPUT_ON || (bus->link.step == STEP_NODES && !bus->link.undoing);
-    if (!bus->link.undoing && !is_ready(bus, bus->link.input)) {
-        return false; /* there is no link to be made any more */
+    if (!is_ready(bus, target_of(bus)) || bus->link.undoing) {
+        return is_ready(bus, target_of(bus));
     }
-    if (needs_output && !is_ready(bus, bus->link.output)) {
-        return false;
-    }
-    return !is_input_step(bus->link.step) || is_ready(bus, bus->link.input);
+    return is_ready(bus, bus->link.input) && (bus->link.step != STEP_NODES || is_ready(bus, bus->link.output));
 }
 
-/* Sends the request of the current step. False: there is nothing to write in it. */
-static bool send_step(pdcp_bus_t *bus)
+/* What the current step writes: the parameter, and its value in bytes[]. Returns the length; 0: nothing is to
+ * be written. */
+static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
 {
-    const uint8_t number = is_input_step(bus->link.step) ? bus->link.input : bus->link.output;
-    pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    const pdcp_channel_t *output = channel_of(bus, bus->link.output);
+    uint16_t low = 0;
+    uint16_t high = 0;
+    uint8_t len = 4;
+    switch ((step_t)bus->link.step) {
+    case STEP_VID_PID:
+        *param = PDCP_IN_SOURCE_VID_PID;
+        low = input->source.vid;
+        high = input->source.pid;
+        break;
+    case STEP_SERIAL:
+        *param = PDCP_IN_SOURCE_SERIAL;
+        low = input->source.sn;
+        high = input->source_index;
+        len = 3;
+        break;
+    case STEP_TYPE:
+        *param = PDCP_IN_SOURCE_TYPE;
+        low = input->source_type;
+        high = input->source_profile;
+        break;
+    case STEP_NODES:
+        *param = PDCP_IN_SOURCE_NODES;
+        len = 2;
+        if (!bus->link.undoing) {
+            low = (uint16_t)(bus->nodes.nodes[output->node].node_id | (uint16_t)(output->node_id << 8));
+        }
+        break;
+    case STEP_INPUT_OFF:
+        *param = PDCP_CH_ENABLED;
+        len = input->enabled ? 1 : 0;
+        break;
+    default: /* STEP_INPUT_ON, STEP_OUTPUT_ON */
+        *param = PDCP_CH_ENABLED;
+        low = bus->link.undoing ? 0 : 1;
+        len = bus->link.step == STEP_OUTPUT_ON && bus->link.output_was_on ? 0 : 1;
+        break;
+    }
+    pdcp_put_u16(&bytes[0], low);
+    pdcp_put_u16(&bytes[2], high);
+    return len;
+}
+
+/* Sends the request of the current step, which concerns this channel. False: there is nothing to write in
+ * it. */
+static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
+{
     if (bus->link.step <= STEP_READ_SERIAL) {
         const uint8_t read =
             bus->link.step == STEP_READ_VID_PID ? PDCP_IN_SOURCE_VID_PID : PDCP_IN_SOURCE_SERIAL;
         pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, read, PDCP_VALUE_MAX);
         return true;
     }
-    uint8_t param = 0;
+    uint8_t param;
     uint8_t bytes[PDCP_VALUE_MAX];
     const uint8_t len = value_of(bus, &param, bytes);
     if (len == 0) {
@@ -513,27 +515,20 @@ static bool send_step(pdcp_bus_t *bus)
 /* Carries the job on until it waits for an answer, waits for a device's place, or is over. */
 static void run(pdcp_bus_t *bus)
 {
-    while (bus->link.active) {
-        bus->link.waiting = false;
+    while (bus->link.active && bus->link.at == PDCP_NONE) {
+        pdcp_channel_t *channel = &bus->nodes.channels[target_of(bus)];
         if (!step_possible(bus)) {
-            if (!bus->link.undoing) {
+            if (bus->link.undoing) {
+                advance(bus);
+            } else {
                 give_up(bus, PDCP_ERR_NO_ANSWER);
-            } else if (!advance(bus)) {
-                end(bus);
             }
-            continue;
-        }
-        const uint8_t number = is_input_step(bus->link.step) ? bus->link.input : bus->link.output;
-        if (!pdcp_request_is_idle(bus, bus->nodes.channels[number].node)) {
-            bus->link.waiting = true;
+        } else if (!pdcp_request_is_idle(bus, channel->node)) {
             return;
-        }
-        if (send_step(bus)) {
-            bus->link.at = bus->nodes.channels[number].node;
-            return;
-        }
-        if (!advance(bus)) {
-            end(bus);
+        } else if (send_step(bus, channel)) {
+            bus->link.at = channel->node;
+        } else {
+            advance(bus);
         }
     }
 }
@@ -560,35 +555,27 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     }
 }
 
-static void go_on(pdcp_bus_t *bus)
-{
-    if (advance(bus)) {
-        run(bus);
-    } else {
-        end(bus);
-    }
-}
-
 /* A step was refused or not answered. */
 static void on_failure(pdcp_bus_t *bus, pdcp_status_t status)
 {
-    if (!bus->link.undoing && bus->link.step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
-        go_on(bus); /* a device without the profile layer (D-BUS-20) */
-        return;
-    }
+    const bool silent = status == PDCP_ERR_NO_ANSWER;
     if (!bus->link.undoing) {
-        bus->link.once = status == PDCP_ERR_NO_ANSWER;
-        give_up(bus, status);
-        run(bus);
+        if (bus->link.step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
+            advance(bus); /* a device without the profile layer (D-BUS-20) */
+        } else {
+            bus->link.once = silent;
+            give_up(bus, status);
+        }
         return;
     }
-    if (status == PDCP_ERR_NO_ANSWER) {
+    if (silent) {
         bus->link.status = (int8_t)status;
-        if (is_input_step(bus->link.step)) {
-            bus->link.step = bus->link.last_step; /* the rest is for the same silent device */
-        }
     }
-    go_on(bus);
+    if (silent && bus->link.step != STEP_OUTPUT_ON) {
+        end(bus); /* the rest is for the same silent device */
+    } else {
+        advance(bus);
+    }
 }
 
 uint8_t pdcp_link_give_up_wish(pdcp_bus_t *bus)
@@ -608,43 +595,33 @@ uint8_t pdcp_link_give_up_wish(pdcp_bus_t *bus)
         bus->link.at = PDCP_NONE;
     }
     on_failure(bus, PDCP_ERR_NO_ANSWER);
+    run(bus);
     return at;
+}
+
+static void on_success(pdcp_bus_t *bus, const pdcp_reply_t *reply)
+{
+    took_effect(bus, reply);
+    bus->link.once = false;
+    if (bus->link.step == STEP_READ_SERIAL && !resolve(bus)) {
+        end(bus);
+    } else if (bus->link.undoing || bus->link.input != PDCP_NONE) { /* else run finds out, and gives up */
+        advance(bus);
+    }
 }
 
 void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
-    const bool gone = (is_input_step(bus->link.step) ? bus->link.input : bus->link.output) == PDCP_NONE;
-    if (!reply->done || gone) {
+    if (!reply->done) {
         return;
     }
     bus->link.at = PDCP_NONE;
-    if (reply->status != PDCP_OK) {
+    if (reply->status == PDCP_OK) {
+        on_success(bus, reply);
+    } else {
         on_failure(bus, (pdcp_status_t)reply->status);
-        return;
     }
-    took_effect(bus, reply);
-    bus->link.once = false;
-    if (!bus->link.undoing && bus->link.input == PDCP_NONE) {
-        give_up(bus, PDCP_ERR_NO_ANSWER);
-        run(bus);
-        return;
-    }
-    if (bus->link.step == STEP_READ_SERIAL && !resolve(bus)) {
-        end(bus);
-        return;
-    }
-    go_on(bus);
-}
-
-static void start_silence(pdcp_bus_t *bus, uint8_t number)
-{
-    if (bus->nodes.channels[number].transfer == PDCP_INPUT) {
-        begin(bus, PDCP_TODO_SILENCE, number, PDCP_NONE, STEP_INPUT_ON);
-        bus->link.last_step = STEP_NODES;
-    } else if (!output_is_needed(bus, number)) { /* nor by a link made meanwhile */
-        begin(bus, PDCP_TODO_SILENCE, PDCP_NONE, number, STEP_OUTPUT_ON);
-        bus->link.last_step = STEP_OUTPUT_ON;
-    }
+    run(bus);
 }
 
 /* Starts the job that a channel has to do, if it can be done now. */
@@ -652,38 +629,25 @@ static void start_todo(pdcp_bus_t *bus, uint8_t number)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
     const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
+    const bool is_input = channel->transfer == PDCP_INPUT;
     channel->todo = PDCP_TODO_NONE;
-    switch (todo) {
-    case PDCP_TODO_SILENCE:
-    case PDCP_TODO_AGAIN:
-        start_silence(bus, number);
-        bus->link.again = todo == PDCP_TODO_AGAIN;
-        break;
-    case PDCP_TODO_REMOVE:
-        begin(bus, todo, number, PDCP_NONE, STEP_INPUT_ON);
-        bus->link.last_step = STEP_VID_PID;
-        take_old(bus, channel);
-        pdcp_nodes_clear_source(channel);
-        break;
-    case PDCP_TODO_CONNECT:
+    if (todo == PDCP_TODO_CONNECT) {
         channel->feed = find_source(bus, channel);
-        if (channel->feed != PDCP_NONE && is_ready(bus, number)) {
-            begin(bus, todo, number, channel->feed, STEP_INPUT_OFF);
-            take_old(bus, channel);
-            name_source(bus);
+        if (channel->feed == PDCP_NONE || !is_ready(bus, number)) {
+            silence_again(bus, number);
         } else {
-            silence_again(bus, channel);
+            begin(bus, todo, number, channel->feed);
         }
-        break;
-    default: /* PDCP_TODO_UPDATE; its direction may not have been known when it came */
-        if (channel->transfer != PDCP_INPUT || bus->link.stored) {
-            const bool connected = channel->transfer == PDCP_INPUT && channel->link == PDCP_LINK_ACTIVE;
-            answer_update(bus, channel->node, channel->index, connected ? PDCP_SUCCESS : PDCP_FAILURE);
-            break;
-        }
-        begin(bus, todo, number, PDCP_NONE, STEP_READ_VID_PID);
-        take_old(bus, channel);
-        break;
+    } else if (todo == PDCP_TODO_UPDATE && (!is_input || bus->link.stored)) {
+        /* its direction may not have been known when it came */
+        answer_update(bus, channel->node, channel->index, channel->link == PDCP_LINK_ACTIVE);
+    } else if (is_input) {
+        begin(bus, todo, number, PDCP_NONE);
+    } else if (!output_is_needed(bus, number)) { /* nor by a link made meanwhile */
+        begin(bus, todo, PDCP_NONE, number);
+    }
+    if (todo == PDCP_TODO_REMOVE) {
+        pdcp_nodes_clear_source(channel);
     }
 }
 
@@ -699,11 +663,9 @@ static void start_wish(pdcp_bus_t *bus)
         return;
     }
     input->todo = PDCP_TODO_NONE;
-    begin(bus, PDCP_TODO_CONNECT, bus->link.wish_input, bus->link.wish_output, STEP_INPUT_OFF);
+    begin(bus, PDCP_TODO_CONNECT, bus->link.wish_input, bus->link.wish_output);
     bus->link.for_host = true;
     bus->link.wish_input = PDCP_NONE;
-    take_old(bus, input);
-    name_source(bus);
 }
 
 /* The channel that is to be seen to next: what silences comes before what connects. */
@@ -712,11 +674,8 @@ static uint8_t next_todo(const pdcp_bus_t *bus)
     uint8_t best = PDCP_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *channel = &bus->nodes.channels[i];
-        if (channel->node == PDCP_NONE || channel->todo == PDCP_TODO_NONE ||
-            bus->nodes.nodes[channel->node].state == PDCP_NODE_SETUP) {
-            continue;
-        }
-        if (best == PDCP_NONE || channel->todo < bus->nodes.channels[best].todo) {
+        if (channel->todo != PDCP_TODO_NONE && bus->nodes.nodes[channel->node].state != PDCP_NODE_SETUP &&
+            (best == PDCP_NONE || channel->todo < bus->nodes.channels[best].todo)) {
             best = i;
         }
     }
@@ -731,9 +690,15 @@ static bool has_work(const pdcp_bus_t *bus)
            (next != PDCP_NONE && bus->nodes.channels[next].todo != PDCP_TODO_AGAIN);
 }
 
+/* Is the job under way one that silences again? */
+static bool is_again(const pdcp_bus_t *bus)
+{
+    return bus->link.active && bus->link.kind == PDCP_TODO_AGAIN;
+}
+
 bool pdcp_link_is_settled(const pdcp_bus_t *bus)
 {
-    return (!bus->link.active || bus->link.again) && !has_work(bus);
+    return (!bus->link.active || is_again(bus)) && !has_work(bus);
 }
 
 /* Who waits for the device's place is served when a request of it ends, so that none may be broken off. */
@@ -750,18 +715,16 @@ static void break_off(pdcp_bus_t *bus)
         bus->link.at = PDCP_NONE;
     }
     bus->link.active = false;
-    silence_again(bus, channel_of(bus, bus->link.input));
-    silence_again(bus, channel_of(bus, bus->link.output));
+    silence_again(bus, bus->link.input);
+    silence_again(bus, bus->link.output);
 }
 
 void pdcp_link_step(pdcp_bus_t *bus)
 {
-    if (bus->link.active && bus->link.again && has_work(bus) && !is_waited_for(bus, bus->link.at)) {
+    if (is_again(bus) && has_work(bus) && !is_waited_for(bus, bus->link.at)) {
         break_off(bus);
     }
-    if (bus->link.active && bus->link.waiting) {
-        run(bus);
-    }
+    run(bus);
     while (!bus->link.active && bus->link.due) {
         const uint8_t next = next_todo(bus);
         const bool urgent = next != PDCP_NONE && bus->nodes.channels[next].todo <= PDCP_TODO_REMOVE;

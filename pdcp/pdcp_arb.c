@@ -86,7 +86,7 @@ static void reset_ends(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 {
     if (node_of(arb, node)->reset_asked) {
         node_of(arb, node)->reset_asked = false;
-        pdcp_bus_tell(&arb->bus, PDCP_EVENT_RESET, node, PDCP_NONE, status);
+        pdcp_bus_tell(&arb->bus, PDCP_EVENT_RESET, node, status);
     }
 }
 
@@ -286,7 +286,7 @@ static void go_silent(pdcp_arb_t *arb)
         host_ends(arb, PDCP_ERR_NO_ANSWER);
     }
     if (wish_waits) {
-        pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_NONE, PDCP_ERR_NO_ANSWER);
+        pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
     pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
 }
@@ -787,7 +787,7 @@ void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state)
             &arb->bus.txq); /* when the bus is back they would be stale; requests repeat themselves */
         pdcp_bus_wake(&arb->bus, PDCP_TIMER_RECOVERY, pause_ms);
     }
-    pdcp_bus_tell(&arb->bus, PDCP_EVENT_STATE, PDCP_NONE, PDCP_NONE, (pdcp_status_t)state);
+    pdcp_bus_tell(&arb->bus, PDCP_EVENT_STATE, PDCP_NONE, (pdcp_status_t)state);
 }
 
 bool pdcp_arb_take_restart(pdcp_arb_t *arb)
@@ -849,7 +849,7 @@ void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pd
     channel->source_type = source->type;
     channel->source_profile = source->profile;
     channel->link = PDCP_LINK_INACTIVE;
-    pdcp_bus_tell(&arb->bus, PDCP_EVENT_LINK, channel->node, input, PDCP_OK);
+    pdcp_bus_tell_link(&arb->bus, PDCP_EVENT_LINK, input, PDCP_OK);
 }
 
 bool pdcp_arb_links_settled(const pdcp_arb_t *arb)

@@ -26,11 +26,21 @@ bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdc
     return pdcp_bus_send_frame(bus, &frame);
 }
 
-void pdcp_bus_tell(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
-                   pdcp_status_t status)
+static void tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
+                 pdcp_status_t status)
 {
     const pdcp_event_t event = {.kind = kind, .node = node, .channel = channel, .status = (int8_t)status};
     bus->on_event(bus->event_ctx, bus->now_ms, &event);
+}
+
+void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status)
+{
+    tell(bus, kind, node, PDCP_NONE, status);
+}
+
+void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status)
+{
+    tell(bus, kind, PDCP_NONE, input, status);
 }
 
 void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
@@ -40,5 +50,5 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
 
 void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node)
 {
-    pdcp_bus_tell(bus, kind, node, PDCP_NONE, PDCP_OK);
+    pdcp_bus_tell(bus, kind, node, PDCP_OK);
 }

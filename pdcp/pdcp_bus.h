@@ -69,10 +69,11 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
 
-void pdcp_bus_tell(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
-                   pdcp_status_t status);
+/* Tells of a device (PDCP_NONE: of none), or of an input and its link. */
+void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status);
+void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status);
 
-/* The same of a device (PDCP_NONE: of none), when there is no more to say. */
+/* The same of a device, when there is no more to say. */
 void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node);
 
 #endif

@@ -61,12 +61,9 @@ static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
     bus->link.due = true;
 }
 
-/* The output that an input names as its source, if its device is set up. */
+/* The output that an input names as its source, if its device is set up; an unconnected input names none. */
 static uint8_t find_source(const pdcp_bus_t *bus, const pdcp_channel_t *input)
 {
-    if (is_unconnected(input)) {
-        return PDCP_NONE;
-    }
     const uint8_t node = pdcp_nodes_find(&bus->nodes, &input->source);
     if (node == PDCP_NONE || node == input->node || bus->nodes.nodes[node].state != PDCP_NODE_READY) {
         return PDCP_NONE;
@@ -163,7 +160,7 @@ void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
     channel->link = PDCP_LINK_INACTIVE;
     put_todo(bus, input, PDCP_TODO_SILENCE);
     release_output(bus, channel->feed);
-    pdcp_bus_tell(bus, PDCP_EVENT_LINK, channel->node, input, PDCP_OK);
+    pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, PDCP_OK);
 }
 
 static void give_back_old(const pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -196,16 +193,11 @@ static void leave_job(pdcp_bus_t *bus, uint8_t node)
     }
 }
 
-static void wish_ends(pdcp_bus_t *bus, pdcp_status_t status)
-{
-    pdcp_bus_tell(bus, PDCP_EVENT_WISH, PDCP_NONE, bus->link.wish_input, status);
-    bus->link.wish_input = PDCP_NONE;
-}
-
 void pdcp_link_forget_wish(pdcp_bus_t *bus, pdcp_status_t status)
 {
     if (bus->link.wish_input != PDCP_NONE) {
-        wish_ends(bus, status);
+        pdcp_bus_tell_link(bus, PDCP_EVENT_WISH, bus->link.wish_input, status);
+        bus->link.wish_input = PDCP_NONE;
     }
 }
 
@@ -223,9 +215,8 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
         }
     }
     leave_job(bus, node);
-    if (bus->link.wish_input != PDCP_NONE &&
-        (owner_of(bus, bus->link.wish_input) == node || owner_of(bus, bus->link.wish_output) == node)) {
-        wish_ends(bus, PDCP_ERR_NO_ANSWER); /* its channels may be others' before its turn */
+    if (owner_of(bus, bus->link.wish_input) == node || owner_of(bus, bus->link.wish_output) == node) {
+        pdcp_link_forget_wish(bus, PDCP_ERR_NO_ANSWER); /* its channels may be others' before its turn */
     }
 }
 
@@ -235,9 +226,8 @@ static uint8_t target_of(const pdcp_bus_t *bus)
     return bus->link.step == STEP_OUTPUT_ON ? bus->link.output : bus->link.input;
 }
 
-static void take_old(pdcp_bus_t *bus)
+static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
 {
-    const pdcp_channel_t *input = &bus->nodes.channels[bus->link.input];
     bus->link.old_source = input->source;
     bus->link.old_index = input->source_index;
     bus->link.old_type = input->source_type;
@@ -246,9 +236,8 @@ static void take_old(pdcp_bus_t *bus)
     bus->link.old_feed = input->feed;
 }
 
-static void name_source(pdcp_bus_t *bus)
+static void name_source(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
-    pdcp_channel_t *input = &bus->nodes.channels[bus->link.input];
     const pdcp_channel_t *output = &bus->nodes.channels[bus->link.output];
     input->source = bus->nodes.nodes[output->node].identity;
     input->source_index = output->index;
@@ -274,27 +263,28 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
     bus->link.for_host = false;
     bus->link.output_was_on = false;
     bus->link.status = PDCP_OK;
-    if (input != PDCP_NONE) {
-        take_old(bus);
+    pdcp_channel_t *channel = channel_of(bus, input);
+    if (channel != NULL) {
+        take_old(bus, channel);
     }
     if (kind == PDCP_TODO_CONNECT) {
         bus->link.step = STEP_INPUT_OFF;
         bus->link.undoing = false;
-        name_source(bus);
+        name_source(bus, channel);
     } else if (kind == PDCP_TODO_UPDATE) {
         bus->link.step = STEP_READ_VID_PID;
         bus->link.undoing = false;
     }
 }
 
-static void tell_link(pdcp_bus_t *bus)
+static void tell_outcome(pdcp_bus_t *bus)
 {
+    const pdcp_status_t status = (pdcp_status_t)bus->link.status;
     if (bus->link.input != PDCP_NONE) {
-        pdcp_bus_tell(bus, PDCP_EVENT_LINK, bus->nodes.channels[bus->link.input].node, bus->link.input,
-                      (pdcp_status_t)bus->link.status);
+        pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, bus->link.input, status);
     }
     if (bus->link.for_host) {
-        pdcp_bus_tell(bus, PDCP_EVENT_WISH, PDCP_NONE, bus->link.input, (pdcp_status_t)bus->link.status);
+        pdcp_bus_tell_link(bus, PDCP_EVENT_WISH, bus->link.input, status);
     }
 }
 
@@ -371,7 +361,7 @@ static void end(pdcp_bus_t *bus)
     if (bus->link.kind == PDCP_TODO_UPDATE && input != NULL && !unread) { /* else the device asks again */
         answer_update(bus, input->node, input->index, bus->link.status == PDCP_OK);
     }
-    tell_link(bus);
+    tell_outcome(bus);
 }
 
 /* Nothing more is to be written forwards. Once the source was written, steps run backwards, the failed one
@@ -400,7 +390,7 @@ static bool resolve(pdcp_bus_t *bus)
         return false;
     }
     input->link = is_unconnected(input) ? PDCP_LINK_NONE : PDCP_LINK_INACTIVE;
-    take_old(bus);
+    take_old(bus, input);
     if (bus->link.output == PDCP_NONE) {
         if (input->enabled) {
             put_todo(bus, bus->link.input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
@@ -408,7 +398,7 @@ static bool resolve(pdcp_bus_t *bus)
         bus->link.status = PDCP_ERR_UNKNOWN;
         return false;
     }
-    name_source(bus);
+    name_source(bus, input);
     return true;
 }
 
@@ -429,17 +419,18 @@ static void advance(pdcp_bus_t *bus)
     }
 }
 
-/* Can the current step be carried out on its device? */
+/* Can the current step be carried out? */
 static bool step_possible(const pdcp_bus_t *bus)
 {
-    if (!is_ready(bus, target_of(bus)) || bus->link.undoing) {
+    if (bus->link.undoing) {
         return is_ready(bus, target_of(bus));
     }
-    return is_ready(bus, bus->link.input) && (bus->link.step != STEP_NODES || is_ready(bus, bus->link.output));
+    const bool needs_output = bus->link.step == STEP_NODES || bus->link.step == STEP_OUTPUT_ON;
+    return is_ready(bus, bus->link.input) && (!needs_output || is_ready(bus, bus->link.output));
 }
 
-/* What the current step writes: the parameter, and its value in bytes[]. Returns the length; 0: nothing is to
- * be written. */
+/* What the current step reads or writes: the parameter, and the value for it in bytes[]. Returns the value's
+ * length; 0: nothing is to be written. */
 static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
 {
     const pdcp_channel_t *input = channel_of(bus, bus->link.input);
@@ -448,11 +439,13 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
     uint16_t high = 0;
     uint8_t len = 4;
     switch ((step_t)bus->link.step) {
+    case STEP_READ_VID_PID:
     case STEP_VID_PID:
         *param = PDCP_IN_SOURCE_VID_PID;
         low = input->source.vid;
         high = input->source.pid;
         break;
+    case STEP_READ_SERIAL:
     case STEP_SERIAL:
         *param = PDCP_IN_SOURCE_SERIAL;
         low = input->source.sn;
@@ -490,15 +483,13 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
  * it. */
 static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
 {
-    if (bus->link.step <= STEP_READ_SERIAL) {
-        const uint8_t read =
-            bus->link.step == STEP_READ_VID_PID ? PDCP_IN_SOURCE_VID_PID : PDCP_IN_SOURCE_SERIAL;
-        pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, read, PDCP_VALUE_MAX);
-        return true;
-    }
     uint8_t param;
     uint8_t bytes[PDCP_VALUE_MAX];
     const uint8_t len = value_of(bus, &param, bytes);
+    if (bus->link.step <= STEP_READ_SERIAL) {
+        pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, PDCP_VALUE_MAX);
+        return true;
+    }
     if (len == 0) {
         return false;
     }
@@ -586,7 +577,7 @@ uint8_t pdcp_link_give_up_wish(pdcp_bus_t *bus)
         return PDCP_NONE;
     }
     bus->link.for_host = false;
-    pdcp_bus_tell(bus, PDCP_EVENT_WISH, PDCP_NONE, bus->link.input, PDCP_ERR_NO_ANSWER);
+    pdcp_bus_tell_link(bus, PDCP_EVENT_WISH, bus->link.input, PDCP_ERR_NO_ANSWER);
     if (bus->link.undoing) {
         return PDCP_NONE;
     }
@@ -629,23 +620,29 @@ static void start_todo(pdcp_bus_t *bus, uint8_t number)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
     const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
-    const bool is_input = channel->transfer == PDCP_INPUT;
+    uint8_t input = number;
+    uint8_t output = PDCP_NONE;
     channel->todo = PDCP_TODO_NONE;
     if (todo == PDCP_TODO_CONNECT) {
-        channel->feed = find_source(bus, channel);
-        if (channel->feed == PDCP_NONE || !is_ready(bus, number)) {
+        output = find_source(bus, channel);
+        channel->feed = output;
+        if (output == PDCP_NONE || !is_ready(bus, number)) {
             silence_again(bus, number);
-        } else {
-            begin(bus, todo, number, channel->feed);
+            return;
         }
-    } else if (todo == PDCP_TODO_UPDATE && (!is_input || bus->link.stored)) {
+    } else if (channel->transfer != PDCP_INPUT) {
+        input = PDCP_NONE;
+        output = number;
+    }
+    if (todo == PDCP_TODO_UPDATE && (input == PDCP_NONE || bus->link.stored)) {
         /* its direction may not have been known when it came */
         answer_update(bus, channel->node, channel->index, channel->link == PDCP_LINK_ACTIVE);
-    } else if (is_input) {
-        begin(bus, todo, number, PDCP_NONE);
-    } else if (!output_is_needed(bus, number)) { /* nor by a link made meanwhile */
-        begin(bus, todo, PDCP_NONE, number);
+        return;
     }
+    if (input == PDCP_NONE && output_is_needed(bus, number)) {
+        return; /* by a link made meanwhile */
+    }
+    begin(bus, todo, input, output);
     if (todo == PDCP_TODO_REMOVE) {
         pdcp_nodes_clear_source(channel);
     }
@@ -655,11 +652,11 @@ static void start_wish(pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = &bus->nodes.channels[bus->link.wish_input];
     if (!is_ready(bus, bus->link.wish_input) || !is_ready(bus, bus->link.wish_output)) {
-        wish_ends(bus, PDCP_ERR_NO_ANSWER);
+        pdcp_link_forget_wish(bus, PDCP_ERR_NO_ANSWER);
         return;
     }
     if (input->link == PDCP_LINK_ACTIVE && input->feed == bus->link.wish_output) {
-        wish_ends(bus, PDCP_OK);
+        pdcp_link_forget_wish(bus, PDCP_OK);
         return;
     }
     input->todo = PDCP_TODO_NONE;
@@ -690,15 +687,9 @@ static bool has_work(const pdcp_bus_t *bus)
            (next != PDCP_NONE && bus->nodes.channels[next].todo != PDCP_TODO_AGAIN);
 }
 
-/* Is the job under way one that silences again? */
-static bool is_again(const pdcp_bus_t *bus)
-{
-    return bus->link.active && bus->link.kind == PDCP_TODO_AGAIN;
-}
-
 bool pdcp_link_is_settled(const pdcp_bus_t *bus)
 {
-    return (!bus->link.active || is_again(bus)) && !has_work(bus);
+    return (!bus->link.active || bus->link.kind == PDCP_TODO_AGAIN) && !has_work(bus);
 }
 
 /* Who waits for the device's place is served when a request of it ends, so that none may be broken off. */
@@ -721,7 +712,8 @@ static void break_off(pdcp_bus_t *bus)
 
 void pdcp_link_step(pdcp_bus_t *bus)
 {
-    if (is_again(bus) && has_work(bus) && !is_waited_for(bus, bus->link.at)) {
+    if (bus->link.active && bus->link.kind == PDCP_TODO_AGAIN && has_work(bus) &&
+        !is_waited_for(bus, bus->link.at)) {
         break_off(bus);
     }
     run(bus);

@@ -6,23 +6,13 @@
 #include "pdcp_setup.h"
 #include "pdcp_time.h"
 
-/* No deadline but that of a controller which is about to leave bus-off. */
-static void forget_deadlines(pdcp_arb_t *arb)
-{
-    const bool recovers =
-        arb->recovery.state == PDCP_BUS_OFF && pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_RECOVERY);
-    pdcp_timers_init(&arb->bus.timers);
-    if (recovers) {
-        pdcp_timers_set(&arb->bus.timers, PDCP_TIMER_RECOVERY,
-                        arb->recovery.changed_ms + arb->recovery.pause_ms);
-    }
-}
-
 /* Nothing is known of the bus; what is remembered and counted stays. */
 static void forget_bus(pdcp_arb_t *arb)
 {
     pdcp_nodes_init(&arb->bus.nodes);
-    forget_deadlines(arb);
+    for (uint8_t i = 0; i < PDCP_TIMER_RECOVERY; i++) { /* a controller that is off leaves that state */
+        pdcp_timers_cancel(&arb->bus.timers, i);
+    }
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->bus);
     memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
@@ -46,6 +36,13 @@ void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event
 static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
 {
     pdcp_bus_count(&arb->bus, stat);
+}
+
+/* Sends a message that has no more than a code and a word. */
+static bool send(pdcp_arb_t *arb, uint8_t priority, uint8_t node_id, uint8_t code, uint16_t word)
+{
+    const pdcp_msg_t msg = {.code = code, .word = word};
+    return pdcp_bus_send(&arb->bus, priority, node_id, &msg);
 }
 
 static pdcp_node_t *node_of(pdcp_arb_t *arb, uint8_t node)
@@ -76,7 +73,7 @@ static void host_ends(pdcp_arb_t *arb, pdcp_status_t status)
     arb->host.waiting = false;
     const pdcp_event_t event = {.kind = PDCP_EVENT_REQUEST,
                                 .node = arb->host.node,
-                                .channel = arb->host.channel,
+                                .channel = PDCP_NONE,
                                 .status = (int8_t)status,
                                 .len = arb->host.len};
     arb->bus.on_event(arb->bus.event_ctx, arb->bus.now_ms, &event);
@@ -91,7 +88,7 @@ static void reset_ends(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 }
 
 /* Takes a device out of service: whoever waits for it learns that it does not answer, its links become
- * inactive. */
+ * inactive, and if it counted, it is lost. */
 static void take_down(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
@@ -102,6 +99,10 @@ static void take_down(pdcp_arb_t *arb, uint8_t node)
     reset_ends(arb, node, PDCP_ERR_NO_ANSWER);
     if (arb->host.active && arb->host.node == node) {
         host_ends(arb, PDCP_ERR_NO_ANSWER);
+    }
+    if (device->beaconed) {
+        device->beaconed = false;
+        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_LOST, node);
     }
 }
 
@@ -115,21 +116,12 @@ static void begin_setup(pdcp_arb_t *arb, uint8_t node)
     expect_life(arb, node);
 }
 
-static void tell_lost(pdcp_arb_t *arb, uint8_t node)
-{
-    if (node_of(arb, node)->beaconed) {
-        node_of(arb, node)->beaconed = false;
-        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_LOST, node);
-    }
-}
-
 /* The device is gone; its ids are kept for it for a while. */
 static void lose(pdcp_arb_t *arb, uint8_t node)
 {
-    take_down(arb, node);
     node_of(arb, node)->asked_again = false;
     set_life(arb, node, PDCP_LOST_KEPT_MS);
-    tell_lost(arb, node);
+    take_down(arb, node);
 }
 
 static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
@@ -139,7 +131,6 @@ static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
     }
     if (node_of(arb, node)->state != PDCP_NODE_LOST) {
         take_down(arb, node); /* it was reset: what was known of its channels' state is gone */
-        tell_lost(arb, node);
     }
     begin_setup(arb, node);
 }
@@ -147,9 +138,6 @@ static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
 static void start_host_request(pdcp_arb_t *arb)
 {
     pdcp_host_request_t *host = &arb->host;
-    if (!host->waiting || !pdcp_request_is_idle(&arb->bus, host->node)) {
-        return;
-    }
     host->waiting = false;
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
     if (host->raw) {
@@ -169,15 +157,16 @@ static void start_host_request(pdcp_arb_t *arb)
 static void serve(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
-    if (arb->host.waiting && arb->host.node == node && !device->asked_again) {
-        start_host_request(arb);
-    }
     if (!pdcp_request_is_idle(&arb->bus, node)) {
         return;
     }
     if (device->asked_again) {
         pdcp_request_get(&arb->bus, node, PDCP_CLIENT_BIND, 0, PDCP_DEV_VID_PID, PDCP_VALUE_MAX);
         pdcp_request_try_once(&arb->bus, node);
+        return;
+    }
+    if (arb->host.waiting && arb->host.node == node) {
+        start_host_request(arb);
         return;
     }
     if (device->reset_asked) {
@@ -197,6 +186,11 @@ static void serve(pdcp_arb_t *arb, uint8_t node)
     if (device->setup_due) {
         pdcp_setup_ask(&arb->bus, node);
     }
+}
+
+static bool is_beacon(const can_frame_t *frame)
+{
+    return frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
 }
 
 static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
@@ -256,8 +250,7 @@ static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
     }
     entry->node_id = id;
     entry->until_ms = arb->bus.now_ms + PDCP_STRANGER_PAUSE_MS;
-    const pdcp_msg_t reset = {.code = PDCP_RESET};
-    if (pdcp_bus_send(&arb->bus, PDCP_PRIORITY_NORMAL, id, &reset)) {
+    if (send(arb, PDCP_PRIORITY_NORMAL, id, PDCP_RESET, 0)) {
         count(arb, PDCP_STAT_STRANGER_RESET);
     }
 }
@@ -266,9 +259,8 @@ static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
 static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
-    const bool is_beacon = frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
     count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (!is_beacon || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb)) {
+    if (!is_beacon(frame) || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb)) {
         return false;
     }
     reset_stranger(arb, id);
@@ -278,16 +270,14 @@ static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 /* D-BUS-12: this arbitrator falls silent; the host, if it waits, is told. */
 static void go_silent(pdcp_arb_t *arb)
 {
-    const bool host_waits = arb->host.active;
-    const bool wish_waits = pdcp_link_wish_waits(&arb->bus);
     arb->silent = true;
-    forget_bus(arb);
-    if (host_waits) {
+    if (arb->host.active) {
         host_ends(arb, PDCP_ERR_NO_ANSWER);
     }
-    if (wish_waits) {
+    if (pdcp_link_wish_waits(&arb->bus)) {
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
+    forget_bus(arb);
     pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
 }
 
@@ -312,8 +302,7 @@ static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         count(arb, PDCP_STAT_DROP_UNUSED_ID);
-    } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && frame->dlc == 1 &&
-               frame->data[0] == PDCP_BEACON) {
+    } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && is_beacon(frame)) {
         on_foreign_beacon(arb);
     } else {
         count(arb, PDCP_STAT_DROP_ARBITRATOR);
@@ -344,10 +333,16 @@ static bool on_beacon(pdcp_arb_t *arb, uint8_t node)
     return true;
 }
 
-/* The host has written a parameter that stands in the tables (D-BUS-25). */
-static void host_has_set(pdcp_arb_t *arb, const uint8_t *value, uint16_t len)
+/* The host has written a parameter, which may stand in the tables (D-BUS-25). */
+static void host_has_set(pdcp_arb_t *arb)
 {
     const pdcp_host_request_t *host = &arb->host;
+    const uint8_t head = host->raw ? 3 : 0;
+    if (host->size < head) {
+        return;
+    }
+    const uint8_t *value = &host->bytes[head];
+    const uint16_t len = (uint16_t)(host->size - head);
     if (host->channel == 0) {
         pdcp_setup_take_time(node_of(arb, host->node), host->param, value,
                              (uint8_t)(len < PDCP_VALUE_MAX ? len : PDCP_VALUE_MAX));
@@ -360,45 +355,30 @@ static void host_has_set(pdcp_arb_t *arb, const uint8_t *value, uint16_t len)
     }
 }
 
-/* The answer to a frame that the host has passed through: the whole of it goes back. */
-static void host_on_raw(pdcp_arb_t *arb, const pdcp_reply_t *reply)
+/* The answer to a frame that the host has passed through goes back as a whole. */
+static void host_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
     pdcp_host_request_t *host = &arb->host;
-    const uint8_t node = host->node;
-    const bool success = reply->status == PDCP_OK && (reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
-    if (success && host->code == PDCP_SET_PARAMETER && host->size >= 3) {
-        host_has_set(arb, &host->bytes[3], (uint16_t)(host->size - 3));
+    const uint16_t end = (uint16_t)(reply->offset + reply->len);
+    const bool success =
+        reply->status == PDCP_OK && (!host->raw || reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
+    if (success && host->code == PDCP_SET_PARAMETER) {
+        host_has_set(arb);
     }
-    if (reply->status == PDCP_OK) {
-        memcpy(host->bytes, reply->bytes, reply->len);
-        host->len = reply->len;
+    if (reply->len != 0 && (host->raw || (host->code == PDCP_GET_PARAMETER && end <= host->size))) {
+        memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
+        host->len = end;
+    }
+    if (!reply->done) {
+        return;
+    }
+    if (end == 0) {
+        host->len = 0; /* a transfer that began anew may have ended empty */
     }
     host_ends(arb, (pdcp_status_t)reply->status);
     if (success && host->code == PDCP_RESET) {
         pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_RESET, node);
         lose(arb, node);
-    }
-}
-
-static void host_on_reply(pdcp_arb_t *arb, const pdcp_reply_t *reply)
-{
-    pdcp_host_request_t *host = &arb->host;
-    if (host->raw) {
-        host_on_raw(arb, reply);
-        return;
-    }
-    if (host->code == PDCP_GET_PARAMETER && reply->len != 0 && reply->offset + reply->len <= host->size) {
-        memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
-        host->len = (uint16_t)(reply->offset + reply->len);
-    }
-    if (host->code == PDCP_SET_PARAMETER && reply->status == PDCP_OK) {
-        host_has_set(arb, host->bytes, host->size);
-    }
-    if (reply->done && reply->offset == 0 && reply->len == 0) {
-        host->len = 0; /* a transfer that began anew may have ended empty */
-    }
-    if (reply->done) {
-        host_ends(arb, (pdcp_status_t)reply->status);
     }
 }
 
@@ -413,12 +393,9 @@ static void reset_on_reply(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 
 /* The check of a device whose identity has asked again (D-BUS-6): any answer shows that the asking one is
  * another. True: it was reset and is bound afresh; whoever waited for its reply has been told. */
-static bool conclude_check(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
+static bool conclude_check(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 {
-    if (!node_of(arb, node)->asked_again || !reply->done) {
-        return false;
-    }
-    const bool answered = reply->status != PDCP_ERR_NO_ANSWER;
+    const bool answered = status != PDCP_ERR_NO_ANSWER;
     const pdcp_bind_result_t result = pdcp_bind_after_check(&arb->bus, node, answered);
     after_bind(arb, node, result);
     if (!answered && result == PDCP_BIND_SUGGESTED) { /* it was reset: known without a second check */
@@ -427,89 +404,98 @@ static bool conclude_check(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
     return !answered;
 }
 
+static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
+{
+    const pdcp_node_t *device = node_of(arb, node);
+    if (pdcp_setup_on_reply(&arb->bus, node, reply) == PDCP_ERR_UNKNOWN && device->taken_back) {
+        reset_stranger(arb, device->node_id);
+        lose(arb, node);
+        return;
+    }
+    if (reply->channel == 0 && reply->param == PDCP_DEV_BEACON_INTERVAL) {
+        expect_life(arb, node);
+    }
+    if (device->state == PDCP_NODE_READY) {
+        pdcp_link_on_ready(&arb->bus, node);
+    } else if (device->state == PDCP_NODE_FAILED) {
+        arb->bus.link.due = true; /* an Update Data Channel may have waited for it */
+    }
+}
+
 static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
-    if (conclude_check(arb, node, reply)) {
+    const pdcp_status_t status = (pdcp_status_t)reply->status;
+    if (reply->done && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
         return;
     }
     switch ((pdcp_client_t)reply->client) {
     case PDCP_CLIENT_SETUP:
-        if (pdcp_setup_on_reply(&arb->bus, node, reply) == PDCP_ERR_UNKNOWN &&
-            node_of(arb, node)->taken_back) {
-            reset_stranger(arb, node_of(arb, node)->node_id);
-            lose(arb, node);
-            return;
-        }
-        if (reply->channel == 0 && reply->param == PDCP_DEV_BEACON_INTERVAL) {
-            expect_life(arb, node);
-        }
-        if (node_of(arb, node)->state == PDCP_NODE_FAILED) {
-            arb->bus.link.due = true; /* an Update Data Channel may have waited for it */
-        }
-        if (reply->done && node_of(arb, node)->state == PDCP_NODE_READY) {
-            pdcp_link_on_ready(&arb->bus, node);
-        }
+        setup_on_reply(arb, node, reply);
         break;
     case PDCP_CLIENT_LINK:
         pdcp_link_on_reply(&arb->bus, reply);
         break;
     case PDCP_CLIENT_HOST:
-        host_on_reply(arb, reply);
+        host_on_reply(arb, node, reply);
         break;
     case PDCP_CLIENT_RESET:
-        reset_on_reply(arb, node, (pdcp_status_t)reply->status);
+        reset_on_reply(arb, node, status);
         break;
     default:
         break;
     }
 }
 
-static bool is_from_device(uint8_t code)
+/* Sets of function codes, one bit each by their low four bits. */
+static bool is_in(uint16_t codes, uint8_t code)
 {
-    return (code & PDCP_ANSWER) != 0
-               ? code != (PDCP_BIND_DEVICE | PDCP_ANSWER) && code != (PDCP_UPDATE_CHANNEL | PDCP_ANSWER)
-               : code == PDCP_BULK_DATA || code == PDCP_UPDATE_CHANNEL;
+    return ((codes >> (code & 0xFu)) & 1u) != 0;
 }
 
 static bool is_deprecated(uint8_t code)
 {
-    const uint8_t request = (uint8_t)(code & 0x7Fu);
-    return request == PDCP_GET_DEVICE_INFO ||
-           (request >= PDCP_IND_GET_PARAMETER && request <= PDCP_SET_NODE_ID);
+    return is_in(1u << PDCP_GET_DEVICE_INFO | 1u << PDCP_IND_GET_PARAMETER | 1u << PDCP_IND_SET_PARAMETER |
+                     1u << PDCP_SET_NODE_ID,
+                 code);
+}
+
+/* May a device send this code? All answers but those that it gets itself. */
+static bool is_from_device(uint8_t code)
+{
+    const uint16_t from_arbitrator = 1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL;
+    const uint16_t requests = 1u << PDCP_BULK_DATA | 1u << PDCP_UPDATE_CHANNEL;
+    return (code & PDCP_ANSWER) != 0 ? !is_in(from_arbitrator, code) : is_in(requests, code);
 }
 
 static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
-    if (pdcp_request_on_frame(&arb->bus, node, frame, &reply)) {
-        count(arb, PDCP_STAT_TAKEN);
+    const uint32_t late = arb->bus.stats[PDCP_STAT_DROP_LATE];
+    pdcp_stat_t stat = PDCP_STAT_TAKEN;
+    bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
+    if (!replied) {
+        const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
+        if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
+            stat = PDCP_STAT_DROP_BAD_CODE;
+        } else if (decoded == PDCP_DECODE_BAD_DLC) {
+            stat = PDCP_STAT_DROP_BAD_DLC;
+        } else if (is_deprecated(msg.code)) {
+            stat = PDCP_STAT_DROP_DEPRECATED;
+        } else if (!is_from_device(msg.code)) {
+            stat = PDCP_STAT_DROP_DIRECTION;
+        } else if (msg.code == PDCP_UPDATE_CHANNEL) {
+            pdcp_link_on_update(&arb->bus, node, msg.channel);
+        } else {
+            replied = pdcp_request_on_message(&arb->bus, node, &msg, &reply);
+        }
+    }
+    if (arb->bus.stats[PDCP_STAT_DROP_LATE] == late) {
+        count(arb, stat);
+    }
+    if (replied) {
         on_reply(arb, node, &reply);
         serve(arb, node);
-        return;
-    }
-    const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
-    if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
-        count(arb, PDCP_STAT_DROP_BAD_CODE);
-    } else if (decoded == PDCP_DECODE_BAD_DLC) {
-        count(arb, PDCP_STAT_DROP_BAD_DLC);
-    } else if (is_deprecated(msg.code)) {
-        count(arb, PDCP_STAT_DROP_DEPRECATED);
-    } else if (!is_from_device(msg.code)) {
-        count(arb, PDCP_STAT_DROP_DIRECTION);
-    } else if (msg.code == PDCP_UPDATE_CHANNEL) {
-        count(arb, PDCP_STAT_TAKEN);
-        pdcp_link_on_update(&arb->bus, node, msg.channel);
-    } else {
-        const uint32_t late = arb->bus.stats[PDCP_STAT_DROP_LATE];
-        const bool replied = pdcp_request_on_message(&arb->bus, node, &msg, &reply);
-        if (arb->bus.stats[PDCP_STAT_DROP_LATE] == late) {
-            count(arb, PDCP_STAT_TAKEN);
-        }
-        if (replied) {
-            on_reply(arb, node, &reply);
-            serve(arb, node);
-        }
     }
 }
 
@@ -543,7 +529,7 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         count(arb, PDCP_STAT_CHANNEL_DATA);
         return false;
     }
-    if (frame->dlc == 1 && frame->data[0] == PDCP_BEACON) {
+    if (is_beacon(frame)) {
         return on_beacon(arb, node); /* by far the most frequent: without decoding */
     }
     on_message(arb, node, frame);
@@ -552,8 +538,7 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
 
 static void send_beacon(pdcp_arb_t *arb)
 {
-    const pdcp_msg_t beacon = {.code = PDCP_BEACON};
-    (void)pdcp_bus_send(&arb->bus, PDCP_PRIORITY_HIGH, PDCP_NODE_BROADCAST, &beacon);
+    (void)send(arb, PDCP_PRIORITY_HIGH, PDCP_NODE_BROADCAST, PDCP_BEACON, 0);
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, PDCP_BEACON_MS);
 }
 
@@ -642,7 +627,7 @@ uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
         on_deadline(arb, timer);
     }
     if (arb->host.waiting) {
-        start_host_request(arb);
+        serve(arb, arb->host.node);
     }
     pdcp_link_step(&arb->bus);
     limit_host_wait(arb);
@@ -670,60 +655,53 @@ static bool is_bound(const pdcp_arb_t *arb, uint8_t node)
     return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST;
 }
 
-static pdcp_status_t host_request(pdcp_arb_t *arb, const pdcp_host_request_t *request)
+static pdcp_status_t host_request(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param,
+                                  uint8_t *bytes, uint16_t size, uint8_t code)
 {
-    if (!is_bound(arb, request->node)) {
+    pdcp_host_request_t *host = &arb->host;
+    if (!is_bound(arb, node)) {
         return PDCP_ERR_UNKNOWN;
     }
-    if (arb->host.active) {
+    if (host->active) {
         return PDCP_ERR_BUSY;
     }
-    arb->host = *request;
-    arb->host.active = true;
-    arb->host.waiting = true;
+    host->active = true;
+    host->waiting = true;
+    host->raw = false;
+    host->code = code;
+    host->node = node;
+    host->channel = channel;
+    host->param = param;
+    host->bytes = bytes;
+    host->size = size;
+    host->len = 0;
     return PDCP_OK;
 }
 
 pdcp_status_t pdcp_arb_get(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
                            uint16_t size)
 {
-    const pdcp_host_request_t request = {.code = PDCP_GET_PARAMETER,
-                                         .node = node,
-                                         .channel = channel,
-                                         .param = param,
-                                         .bytes = bytes,
-                                         .size = size};
-    return host_request(arb, &request);
+    return host_request(arb, node, channel, param, bytes, size, PDCP_GET_PARAMETER);
 }
 
 pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
                            uint16_t size)
 {
-    const pdcp_host_request_t request = {.code = PDCP_SET_PARAMETER,
-                                         .node = node,
-                                         .channel = channel,
-                                         .param = param,
-                                         .bytes = bytes,
-                                         .size = size};
-    return host_request(arb, &request);
+    return host_request(arb, node, channel, param, bytes, size, PDCP_SET_PARAMETER);
 }
 
 pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint16_t time_ms)
 {
-    const pdcp_host_request_t request = {.code = code, .node = node, .size = time_ms};
-    return host_request(arb, &request);
+    return host_request(arb, node, 0, 0, NULL, time_ms, code);
 }
 
 pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data, uint8_t dlc)
 {
-    const pdcp_host_request_t request = {.raw = true,
-                                         .code = data[0],
-                                         .node = node,
-                                         .param = data[1],
-                                         .channel = data[2],
-                                         .bytes = data,
-                                         .size = dlc};
-    return host_request(arb, &request);
+    const pdcp_status_t status = host_request(arb, node, data[2], data[1], data, dlc, data[0]);
+    if (status == PDCP_OK) {
+        arb->host.raw = true;
+    }
+    return status;
 }
 
 void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms)
@@ -746,8 +724,7 @@ void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms)
 
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 {
-    const pdcp_msg_t msg = {.code = code, .word = time_ms};
-    return !arb->silent && pdcp_bus_send(&arb->bus, PDCP_PRIORITY_NORMAL, PDCP_NODE_BROADCAST, &msg);
+    return !arb->silent && send(arb, PDCP_PRIORITY_NORMAL, PDCP_NODE_BROADCAST, code, time_ms);
 }
 
 bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
@@ -800,9 +777,8 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb)
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
 {
     const pdcp_channel_t *channels = arb->bus.nodes.channels;
-    if (output >= PDCP_CHANNELS_MAX || input >= PDCP_CHANNELS_MAX || channels[output].node == PDCP_NONE ||
-        channels[input].node == PDCP_NONE || channels[output].transfer != PDCP_OUTPUT ||
-        channels[input].transfer != PDCP_INPUT) {
+    if (output >= PDCP_CHANNELS_MAX || input >= PDCP_CHANNELS_MAX ||
+        channels[output].transfer != PDCP_OUTPUT || channels[input].transfer != PDCP_INPUT) {
         return PDCP_ERR_UNKNOWN;
     }
     if (channels[output].node == channels[input].node) {
@@ -814,8 +790,7 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
 {
     const pdcp_channel_t *channels = arb->bus.nodes.channels;
-    if (input >= PDCP_CHANNELS_MAX || channels[input].node == PDCP_NONE ||
-        channels[input].link == PDCP_LINK_NONE) {
+    if (input >= PDCP_CHANNELS_MAX || channels[input].link == PDCP_LINK_NONE) {
         return false;
     }
     pdcp_link_remove(&arb->bus, input);
@@ -831,18 +806,12 @@ void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored)
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     arb->bus.now_ms = now_ms;
-    if (input < PDCP_CHANNELS_MAX && arb->bus.nodes.channels[input].node != PDCP_NONE &&
-        arb->bus.nodes.channels[input].link == PDCP_LINK_ACTIVE) {
-        pdcp_link_rest(&arb->bus, input);
-    }
+    pdcp_link_rest(&arb->bus, input);
 }
 
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source)
 {
     pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
-    if (channel->link != PDCP_LINK_NONE) {
-        return;
-    }
     arb->bus.now_ms = now_ms;
     channel->source = source->identity;
     channel->source_index = source->index;

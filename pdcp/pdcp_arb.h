@@ -50,14 +50,14 @@ typedef struct {
     uint32_t asked_ms;   /* when a device asked to bind last, or the start */
     uint32_t started_ms; /* means something while young */
     uint32_t foreign_ms; /* when another arbitrator was heard last */
-    uint16_t spread_ms;  /* of the standby, from the serial number */
     bool young;          /* in its first PDCP_YOUNG_MS */
     bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */
     bool silent;         /* on standby (D-BUS-12) */
     bool restart;        /* the controller is to be restarted */
-    pdcp_recovery_t recovery;
-    pdcp_bus_t bus;
     pdcp_host_request_t host;
+    pdcp_bus_t bus;
+    pdcp_recovery_t recovery;
+    uint16_t spread_ms; /* of the standby, from the serial number */
     pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
 } pdcp_arb_t;
 
@@ -133,11 +133,10 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb);
 void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored);
 
 /* Lets the active link of an input rest: both ends are disabled, its source stays written (D-PRO-9);
- * PDCP_EVENT_LINK comes at once. Of others, and of PDCP_NONE, nothing happens. */
+ * PDCP_EVENT_LINK comes at once. */
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
 
-/* Lists the link of an input that has none as inactive, with a source that need not be there; nothing is
- * sent.
+/* Lists a link of an input that has none as inactive, with a source that need not be there; nothing is sent.
  */
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source);
 

@@ -16,19 +16,19 @@
 struct pdcp_bus;
 
 typedef struct {
-    bool planned;       /* the profile layer decides which links are made: none comes by itself */
-    bool stored;        /* and from a stored configuration: Update Data Channel changes nothing */
-    bool due;           /* some channel has something to do */
-    bool active;        /* a job is under way */
-    bool undoing;       /* steps run backwards */
-    bool once;          /* the device that failed is tried once only */
-    bool for_host;      /* the host waits for the outcome */
-    uint8_t at;         /* place of the device whose answer the job waits for; PDCP_NONE: of none, the job goes
-                           on when the device it is about has no other request under way */
-    uint8_t kind;       /* pdcp_todo_t of the job; PDCP_TODO_AGAIN: whatever comes interrupts it */
-    uint8_t step;       /* pdcp_link.c */
-    uint8_t input;      /* channel number; PDCP_NONE: gone, or the job has none */
-    uint8_t output;     /* channel number; PDCP_NONE: gone, or the job has none */
+    bool planned;   /* the profile layer decides which links are made: none comes by itself */
+    bool stored;    /* and from a stored configuration: Update Data Channel changes nothing */
+    bool due;       /* some channel has something to do */
+    bool active;    /* a job is under way */
+    bool undoing;   /* steps run backwards */
+    bool once;      /* the device that failed is tried once only */
+    bool for_host;  /* the host waits for the outcome */
+    uint8_t at;     /* place of the device whose answer the job waits for; PDCP_NONE: of none, the job goes
+                       on when the device it is about has no other request under way */
+    uint8_t kind;   /* pdcp_todo_t of the job; PDCP_TODO_AGAIN: whatever comes interrupts it */
+    uint8_t step;   /* pdcp_link.c */
+    uint8_t input;  /* channel number; PDCP_NONE: gone, or the job has none */
+    uint8_t output; /* channel number; PDCP_NONE: gone, or the job has none */
     bool output_was_on; /* before the job */
     int8_t status;      /* outcome so far, pdcp_status_t */
     /* The link that the host has asked for; wish_input PDCP_NONE: none. */

@@ -1,13 +1,6 @@
 #include "pdcp_timer.h"
 
-#include <string.h>
-
 #include "pdcp_time.h"
-
-void pdcp_timers_init(pdcp_timers_t *timers)
-{
-    memset(timers, 0, sizeof *timers);
-}
 
 static bool earlier(const pdcp_timers_t *timers, uint8_t a, uint8_t b)
 {

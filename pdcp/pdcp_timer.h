@@ -19,14 +19,13 @@ enum {
     PDCP_TIMERS_MAX
 };
 
+/* All 0: none is set. */
 typedef struct {
     uint32_t deadline_ms[PDCP_TIMERS_MAX];
     uint8_t heap[PDCP_TIMERS_MAX];  /* timer numbers; earliest first */
     uint8_t place[PDCP_TIMERS_MAX]; /* where a timer stands in heap, plus 1; 0: not set */
     uint8_t count;
 } pdcp_timers_t;
-
-void pdcp_timers_init(pdcp_timers_t *timers);
 
 /* Sets timer to deadline_ms, replacing what it was set to. */
 void pdcp_timers_set(pdcp_timers_t *timers, uint8_t timer, uint32_t deadline_ms);

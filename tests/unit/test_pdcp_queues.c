@@ -30,7 +30,7 @@ static void test_timers_fire_in_order_of_their_deadlines(void)
     static bool set[PDCP_TIMERS_MAX];
     static uint32_t deadline[PDCP_TIMERS_MAX];
     uint32_t now_ms = 0xFFFF0000u;
-    pdcp_timers_init(&timers);
+    memset(&timers, 0, sizeof timers);
     memset(set, 0, sizeof set);
     for (uint32_t round = 0; round < TIMER_ROUNDS; round++) {
         const uint8_t timer = (uint8_t)any(PDCP_TIMERS_MAX);

@@ -138,15 +138,15 @@ void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame)
     frame->data[0] = msg->code;
 }
 
-uint8_t pdcp_value_u8(const uint8_t *value, uint8_t len, uint8_t at)
+uint8_t pdcp_value_u8(const uint8_t *value, uint16_t len, uint16_t at)
 {
     return at < len ? value[at] : 0;
 }
 
-uint16_t pdcp_value_u16(const uint8_t *value, uint8_t len, uint8_t at)
+uint16_t pdcp_value_u16(const uint8_t *value, uint16_t len, uint16_t at)
 {
     const uint16_t low = pdcp_value_u8(value, len, at);
-    const uint16_t high = pdcp_value_u8(value, len, (uint8_t)(at + 1));
+    const uint16_t high = pdcp_value_u8(value, len, (uint16_t)(at + 1u));
     return (uint16_t)(low | (uint16_t)(high << 8));
 }
 

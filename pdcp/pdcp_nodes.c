@@ -2,14 +2,23 @@
 
 #include <string.h>
 
+/* Makes a place free. */
+static void clear_place(pdcp_nodes_t *nodes, uint8_t place)
+{
+    pdcp_node_t *node = &nodes->nodes[place];
+    memset(node, 0, sizeof *node);
+    node->place = place;
+    node->first_channel = PDCP_NONE;
+}
+
 void pdcp_nodes_init(pdcp_nodes_t *nodes)
 {
     memset(nodes, 0, sizeof *nodes);
     for (uint16_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         nodes->channels[i].node = PDCP_NONE;
     }
-    for (uint16_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        nodes->nodes[i].first_channel = PDCP_NONE;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        clear_place(nodes, i);
     }
 }
 
@@ -46,11 +55,9 @@ uint8_t pdcp_nodes_add(pdcp_nodes_t *nodes, const pdcp_identity_t *identity, uin
         return PDCP_NONE;
     }
     pdcp_node_t *node = &nodes->nodes[place];
-    memset(node, 0, sizeof *node);
     node->state = PDCP_NODE_SETUP;
     node->identity = *identity;
     node->node_id = node_id;
-    node->first_channel = PDCP_NONE;
     node->beacon_ms = PDCP_BEACON_MS;
     node->ack_ms = PDCP_ACK_MS;
     nodes->owner[node_id] = (uint8_t)(place + 1);
@@ -126,8 +133,7 @@ void pdcp_nodes_remove(pdcp_nodes_t *nodes, uint8_t node)
     drop_needs(nodes, node);
     cut_channels(nodes, node, 0);
     nodes->owner[nodes->nodes[node].node_id] = 0;
-    memset(&nodes->nodes[node], 0, sizeof nodes->nodes[node]);
-    nodes->nodes[node].first_channel = PDCP_NONE;
+    clear_place(nodes, node);
 }
 
 static uint8_t free_channels(const pdcp_nodes_t *nodes)
@@ -151,10 +157,8 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
     input->source_profile = 0;
 }
 
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len)
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
 {
-    const uint16_t low = pdcp_value_u16(value, len, 0);
-    const uint16_t high = pdcp_value_u16(value, len, 2);
     if (param == PDCP_IN_SOURCE_VID_PID) {
         input->source.vid = low;
         input->source.pid = high;

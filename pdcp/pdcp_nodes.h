@@ -32,6 +32,7 @@ typedef struct {
     uint32_t heard_ms;    /* last frame from it */
     uint16_t needs_at;    /* its block in the pool of needs */
     uint8_t needs_stride; /* bytes of one set: (inputs + 7) / 8; 0: it has no block */
+    uint8_t place;        /* its own number in the table */
     uint8_t state;        /* pdcp_node_state_t */
     uint8_t node_id;
     uint8_t channel_count;
@@ -42,7 +43,6 @@ typedef struct {
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
     uint8_t asked_id;      /* with this id */
     bool setup_again;      /* it was left before: tried once more, silently (D-BUS-17) */
-    bool setup_due;        /* the next request of the setup is to be sent */
     uint8_t setup_pass;    /* pdcp_setup.c */
     uint8_t setup_step;
     uint8_t setup_channel;
@@ -121,8 +121,9 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
 /* Makes the source of an input that of an unconnected one (D-BUS-7). */
 void pdcp_nodes_clear_source(pdcp_channel_t *input);
 
-/* Takes over a parameter that names the source of an input: 5, 6 or 8. */
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len);
+/* Takes over a parameter that names the source of an input, 5, 6 or 8: the first and the second of its words.
+ */
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */

@@ -232,13 +232,15 @@ pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *
         return PDCP_BIND_CHECK;
     }
     const uint8_t id = choose_id(bus, identity, asked);
-    if (id == 0 || !pdcp_nodes_has_place(&bus->nodes)) {
+    const uint8_t place = pdcp_nodes_free_place(&bus->nodes);
+    if (id == 0 || place == PDCP_NONE) {
         return refuse(bus, identity, asked);
     }
     if (id != asked) {
         return suggest(bus, identity, asked, id);
     }
-    *node = pdcp_nodes_add(&bus->nodes, identity, asked);
+    *node = place;
+    pdcp_nodes_add(&bus->nodes, place, identity, asked);
     return grant(bus, identity, asked);
 }
 

@@ -21,10 +21,10 @@ enum {
 
 /* All 0: none is set. */
 typedef struct {
-    uint32_t deadline_ms[PDCP_TIMERS_MAX];
     uint8_t heap[PDCP_TIMERS_MAX];  /* timer numbers; earliest first */
     uint8_t place[PDCP_TIMERS_MAX]; /* where a timer stands in heap, plus 1; 0: not set */
     uint8_t count;
+    uint32_t deadline_ms[PDCP_TIMERS_MAX];
 } pdcp_timers_t;
 
 /* Sets timer to deadline_ms, replacing what it was set to. */

@@ -81,8 +81,9 @@ static void host_ends(pdcp_arb_t *arb, pdcp_status_t status)
 
 static void reset_ends(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 {
-    if (node_of(arb, node)->reset_asked) {
-        node_of(arb, node)->reset_asked = false;
+    pdcp_node_t *device = node_of(arb, node);
+    if (device->reset_asked) {
+        device->reset_asked = false;
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_RESET, node, status);
     }
 }
@@ -139,8 +140,8 @@ static void start_host_request(pdcp_arb_t *arb)
     pdcp_host_request_t *host = &arb->host;
     host->waiting = false;
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
-    pdcp_request_start(&arb->bus, host->node, host->raw ? PDCP_CLIENT_RAW : PDCP_CLIENT_HOST, host->code,
-                       host->channel, host->param, host->bytes, host->size);
+    pdcp_request_start(&arb->bus, host->node, (pdcp_client_t)host->client, host->code, host->channel,
+                       host->param, host->bytes, host->size);
 }
 
 /* A device's place may have become free for its next request: the check of its identity comes first, then the
@@ -322,7 +323,7 @@ static bool on_beacon(pdcp_arb_t *arb, uint8_t node)
 static void host_has_set(pdcp_arb_t *arb)
 {
     const pdcp_host_request_t *host = &arb->host;
-    const uint8_t head = host->raw ? 3 : 0;
+    const uint8_t head = host->client == PDCP_CLIENT_RAW ? 3 : 0;
     if (host->size < head) {
         return;
     }
@@ -344,12 +345,13 @@ static void host_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *rep
 {
     pdcp_host_request_t *host = &arb->host;
     const uint16_t end = (uint16_t)(reply->offset + reply->len);
+    const bool raw = host->client == PDCP_CLIENT_RAW;
     const bool success =
-        reply->status == PDCP_OK && (!host->raw || reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
+        reply->status == PDCP_OK && (!raw || reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
     if (success && host->code == PDCP_SET_PARAMETER) {
         host_has_set(arb);
     }
-    if (reply->len != 0 && (host->raw || (host->code == PDCP_GET_PARAMETER && end <= host->size))) {
+    if (reply->len != 0 && (raw || (host->code == PDCP_GET_PARAMETER && end <= host->size))) {
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
         host->len = end;
     }
@@ -652,7 +654,7 @@ static pdcp_status_t host_request(pdcp_arb_t *arb, uint8_t node, uint8_t channel
     }
     host->active = true;
     host->waiting = true;
-    host->raw = false;
+    host->client = PDCP_CLIENT_HOST;
     host->code = code;
     host->node = node;
     host->channel = channel;
@@ -684,7 +686,7 @@ pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data,
 {
     const pdcp_status_t status = host_request(arb, node, data[2], data[1], data, dlc, data[0]);
     if (status == PDCP_OK) {
-        arb->host.raw = true;
+        arb->host.client = PDCP_CLIENT_RAW;
     }
     return status;
 }

@@ -19,8 +19,9 @@
 /* The host's request to a device; one at a time. */
 typedef struct {
     bool active;
-    bool waiting; /* for the device's place */
-    bool raw;     /* a frame as the host made it: bytes holds its data, 8 bytes of room, size is its DLC */
+    bool waiting;   /* for the device's place */
+    uint8_t client; /* PDCP_CLIENT_HOST; PDCP_CLIENT_RAW: a frame as the host made it, bytes holds its data, 8
+                       bytes of room, size is its DLC */
     uint8_t code; /* PDCP_GET_PARAMETER, PDCP_SET_PARAMETER, PDCP_SUSPEND, PDCP_RELEASE; raw: any request's */
     uint8_t node;
     uint8_t channel;

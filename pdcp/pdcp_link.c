@@ -299,9 +299,8 @@ static void silence_again(pdcp_bus_t *bus, uint8_t number)
 
 /* The link of an input could not be made: it is what it was before, or remembered as inactive; one that
  * worked is made anew. */
-static void settle_failed(pdcp_bus_t *bus)
+static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
-    pdcp_channel_t *input = channel_of(bus, bus->link.input);
     pdcp_bus_count(bus, PDCP_STAT_LINK_FAILED);
     if (bus->link.output_was_on) {
         release_output(bus, bus->link.output); /* whose other listeners may be gone meanwhile */
@@ -324,15 +323,14 @@ static void settle_failed(pdcp_bus_t *bus)
     silence_again(bus, bus->link.input);
 }
 
-static void settle_made(pdcp_bus_t *bus)
+static void settle_made(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
-    bus->nodes.channels[bus->link.input].link = PDCP_LINK_ACTIVE;
+    input->link = PDCP_LINK_ACTIVE;
     release_output(bus, bus->link.old_feed); /* unless it is the same: that one is needed */
 }
 
-static void settle_silenced(pdcp_bus_t *bus)
+static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
-    pdcp_channel_t *input = channel_of(bus, bus->link.input);
     if (bus->link.status == PDCP_ERR_NO_ANSWER) {
         silence_again(bus, bus->link.input);
         silence_again(bus, bus->link.output);
@@ -346,20 +344,20 @@ static void settle_silenced(pdcp_bus_t *bus)
 
 static void end(pdcp_bus_t *bus)
 {
-    const pdcp_channel_t *input = channel_of(bus, bus->link.input);
-    const bool making = bus->link.kind == PDCP_TODO_CONNECT || bus->link.kind == PDCP_TODO_UPDATE;
+    pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    const bool made = bus->link.status == PDCP_OK;
     bus->link.active = false;
     bus->link.due = true;
-    if (!making) {
-        settle_silenced(bus);
-    } else if (bus->link.status == PDCP_OK) {
-        settle_made(bus);
+    if (bus->link.kind != PDCP_TODO_CONNECT && bus->link.kind != PDCP_TODO_UPDATE) {
+        settle_silenced(bus, input);
+    } else if (made) {
+        settle_made(bus, input);
     } else {
-        settle_failed(bus);
+        settle_failed(bus, input);
     }
-    const bool unread = bus->link.status == PDCP_ERR_NO_ANSWER && bus->link.step <= STEP_READ_SERIAL;
-    if (bus->link.kind == PDCP_TODO_UPDATE && input != NULL && !unread) { /* else the device asks again */
-        answer_update(bus, input->node, input->index, bus->link.status == PDCP_OK);
+    if (bus->link.kind == PDCP_TODO_UPDATE && input != NULL && /* a device that was not read asks again */
+        (bus->link.status != PDCP_ERR_NO_ANSWER || bus->link.step > STEP_READ_SERIAL)) {
+        answer_update(bus, input->node, input->index, made);
     }
     tell_outcome(bus);
 }

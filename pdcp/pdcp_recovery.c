@@ -5,9 +5,7 @@
 
 static uint16_t next_pause(const pdcp_recovery_t *recovery, uint32_t now_ms)
 {
-    const bool recovered = recovery->state != PDCP_BUS_OFF &&
-                           pdcp_time_reached(now_ms, recovery->changed_ms + recovery->pause_ms);
-    if (recovery->pause_ms == 0 || recovered) {
+    if (recovery->pause_ms == 0 || pdcp_time_reached(now_ms, recovery->changed_ms + recovery->pause_ms)) {
         return PDCP_RECOVERY_MS;
     }
     const uint16_t doubled = (uint16_t)(2u * recovery->pause_ms);

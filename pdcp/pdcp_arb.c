@@ -10,8 +10,8 @@
 static void forget_bus(pdcp_arb_t *arb)
 {
     pdcp_nodes_init(&arb->bus.nodes);
-    for (uint8_t i = 0; i < PDCP_TIMER_RECOVERY; i++) { /* a controller that is off leaves that state */
-        pdcp_timers_cancel(&arb->bus.timers, i);
+    for (int i = 0; i < PDCP_TIMER_RECOVERY; i++) { /* a controller that is off leaves that state */
+        pdcp_timers_cancel(&arb->bus.timers, (uint8_t)i);
     }
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->bus);
@@ -434,7 +434,7 @@ static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 }
 
 /* Sets of function codes, one bit each by their low four bits. */
-static bool is_in(uint16_t codes, uint8_t code)
+static bool is_in(unsigned codes, uint8_t code)
 {
     return ((codes >> (code & 0xFu)) & 1u) != 0;
 }
@@ -449,8 +449,8 @@ static bool is_deprecated(uint8_t code)
 /* May a device send this code? All answers but those that it gets itself. */
 static bool is_from_device(uint8_t code)
 {
-    const uint16_t from_arbitrator = 1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL;
-    const uint16_t requests = 1u << PDCP_BULK_DATA | 1u << PDCP_UPDATE_CHANNEL;
+    const unsigned from_arbitrator = 1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL;
+    const unsigned requests = 1u << PDCP_BULK_DATA | 1u << PDCP_UPDATE_CHANNEL;
     return (code & PDCP_ANSWER) != 0 ? !is_in(from_arbitrator, code) : is_in(requests, code);
 }
 

@@ -505,7 +505,7 @@ static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
 static void run(pdcp_bus_t *bus)
 {
     while (bus->link.active && bus->link.at == PDCP_NONE) {
-        pdcp_channel_t *channel = &bus->nodes.channels[target_of(bus)];
+        pdcp_channel_t *channel = channel_of(bus, target_of(bus));
         if (!step_possible(bus)) {
             if (bus->link.undoing) {
                 advance(bus);

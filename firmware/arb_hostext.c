@@ -192,6 +192,14 @@ static void put_host_counters(arb_call_t *call)
     put_counters(call, api->events.dropped, ARB_EVENT_KINDS);
 }
 
+static void put_driver_counters(arb_call_t *call)
+{
+    const arb_port_t *port = call->env->port;
+    for (uint8_t i = 0; i < ARB_PORT_COUNTERS; i++) {
+        put_counter(call, port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0);
+    }
+}
+
 /* 2413h: group. */
 static uint8_t statistics(arb_call_t *call)
 {
@@ -212,6 +220,9 @@ static uint8_t statistics(arb_call_t *call)
         put_counter(call, limb->flags.failures);
         put_counter(call, limb->flags.damaged);
         put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
+        return ARB_OK;
+    case ARB_STATS_DRIVERS:
+        put_driver_counters(call);
         return ARB_OK;
     default:
         return ARB_ERR_NUMBER;

@@ -62,6 +62,15 @@ static int8_t nvm_status(void *ctx)
     return (int8_t)hal_nvm_status(((firmware_t *)ctx)->nvm);
 }
 
+static uint32_t counter(void *ctx, arb_port_counter_t which)
+{
+    const firmware_t *self = ctx;
+    const hal_can_health_t health = hal_can_health(self->can);
+    return which == ARB_PORT_FRAMES_LOST     ? health.rx_overruns
+           : which == ARB_PORT_FRAMES_UNSENT ? health.tx_failed
+                                             : uart1_lost(self->uart);
+}
+
 /* One batch: what is left waits for the next turn, which follows at once. */
 static void take_frames(firmware_t *self, uint32_t now_ms)
 {
@@ -110,7 +119,8 @@ static void start(firmware_t *self)
                               .host_write = host_write,
                               .nvm_read = nvm_read,
                               .nvm_write = nvm_write,
-                              .nvm_status = nvm_status};
+                              .nvm_status = nvm_status,
+                              .counter = counter};
     const arb_settings_t settings = {.serial = hal_sys_serial()};
     arb_app_init(&self->app, &self->port, &settings, hal_clock_ms());
     /* Last: that reads the EEPROM, and frames that came meanwhile would be old or lost. Now they are

@@ -220,7 +220,7 @@ def test_nothing_is_wider_than_the_terminal(quiet: Cli, width: int) -> None:
 def test_stats(quiet: Cli) -> None:
     """2413h: names for all counters that the arbitrator has, and no more."""
     data = quiet("stats", "--json").json("stats")
-    assert [group["name"] for group in data] == ["bus", "host", "storage"]
+    assert [group["name"] for group in data] == ["bus", "host", "storage", "drivers"]
     for group in data:
         names = [counter["name"] for counter in group["counters"]]
         assert not [name for name in names if name.startswith("counter_")], f"group {group['name']} has more counters"

@@ -300,7 +300,8 @@ def links(ctx: typer.Context, names: NamesOption = True, as_json: JsonOption = F
 def stats(
     ctx: typer.Context,
     group: Annotated[
-        str | None, typer.Argument(metavar="GROUP", help="A group: bus, host, storage, drivers, or its number. Without: all.")
+        str | None,
+        typer.Argument(metavar="GROUP", help="A group: bus, host, storage, drivers, or its number. Without: all."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:

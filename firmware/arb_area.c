@@ -50,12 +50,13 @@ static uint16_t area_address(const arb_record_t *record, uint8_t area)
 /* Reads an area whose header is good so far. False: it is not good. */
 static bool is_whole(const arb_record_t *record, const arb_nvm_t *nvm, uint16_t address, uint8_t count)
 {
+    uint16_t left = arb_record_length(record, count);
     uint32_t crc = ARB_CRC32_INIT;
     uint8_t byte;
-    if (count < record->least || count > record->most) {
+    if (left > record->size) {
         return false;
     }
-    for (uint16_t left = arb_record_length(record, count); left > 0; left--) {
+    for (; left > 0; left--) {
         if (!arb_nvm_read(nvm, address, &byte, 1)) {
             return false;
         }

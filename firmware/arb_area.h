@@ -55,8 +55,6 @@ typedef struct {
     uint16_t size;    /* bytes of an area, whole pages */
     uint8_t letter;
     uint8_t entry; /* bytes of an entry, ARB_RECORD_ENTRY_MAX at most */
-    uint8_t least; /* entries */
-    uint8_t most;
     /* Entry k of the next copy, and of the newest one when it is loaded. */
     void (*put)(const void *table, uint8_t k, uint8_t *entry);
     void (*take)(void *table, uint8_t k, const uint8_t *entry);

@@ -14,7 +14,7 @@ enum { CONFIG_MEMBERS = 8 }; /* bytes of a header before its CRC */
 enum { CONFIG_CHUNK = (int)ARB_CONFIG_READ_MAX / PROFILE_TLV_ENTRY_BYTES * PROFILE_TLV_ENTRY_BYTES };
 
 typedef enum {
-    PHASE_IDLE,
+    PHASE_IDLE = 0, /* see arb_config_busy */
     PHASE_READ,    /* the stored string goes to the sink */
     PHASE_SCAN,    /* save, erase: where in the stored string what stands */
     PHASE_COMPARE, /* is the new string what is stored? */
@@ -129,11 +129,6 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
 
 /* Jobs -------------------------------------------------------------------------------------------------- */
 
-bool arb_config_busy(const arb_config_t *config)
-{
-    return config->phase != PHASE_IDLE;
-}
-
 static void start(arb_config_t *config, phase_t phase, arb_config_done_t done, void *ctx, uint32_t now_ms)
 {
     config->phase = (uint8_t)phase;
@@ -152,9 +147,6 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
         config->counters[ARB_CONFIG_COUNT_UNCHANGED]++;
     } else if (status == ARB_CONFIG_ERR_STORAGE) {
         config->counters[ARB_CONFIG_FAILURES]++;
-    }
-    if (status < 0 && config->piece != NULL) {
-        config->raw_at = 0;
     }
     config->done(config->ctx, status);
 }
@@ -175,11 +167,11 @@ static void start_change(arb_config_t *config, uint8_t number, uint16_t block, a
                          void *ctx, uint32_t now_ms)
 {
     config->number = number;
+    config->stored_new = (uint8_t)(config->stored + (block != 0 ? 1 : 0));
     config->block = block;
     config->raw_at = 0;
     config->length_new = 0;
     config->count_at = CONFIG_NOWHERE;
-    config->cut_from = 0;
     config->cut_to = 0;
     start(config, PHASE_SCAN, done, ctx, now_ms);
     open_string(config, config->newest.area, config->length, NULL);
@@ -192,10 +184,10 @@ arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
     }
-    if (*number == 0 && config->stored == 0xFF) {
-        return ARB_CONFIG_ERR_STORAGE;
-    }
     if (*number == 0) {
+        if (config->stored == 0xFF) {
+            return ARB_CONFIG_ERR_STORAGE;
+        }
         do {
             (*number)++;
         } while (arb_config_has(config, *number));
@@ -244,6 +236,7 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
     }
     start(config, config->same ? PHASE_COMPARE : PHASE_WRITE, done, ctx, now_ms);
     config->piece = bytes;
+    config->raw_at = 0; /* until the piece is in */
     config->count_at = CONFIG_NOWHERE;
     config->cut_from = offset;
     config->at = offset;
@@ -339,7 +332,6 @@ static arb_config_status_t end_part(arb_config_t *config)
         config->phase = PHASE_IDLE;
         return ARB_CONFIG_OK;
     }
-    config->raw_at = 0;
     if (config->same) {
         return ARB_CONFIG_UNCHANGED;
     }
@@ -400,8 +392,7 @@ static arb_config_status_t step_write(arb_config_t *config, const arb_nvm_t *nvm
     /* In front of the cut, with no more than 255 configurations: the low byte is all that changes. */
     const uint16_t count_at = (uint16_t)(config->count_at + 1 - at);
     if (count_at < len) {
-        page[count_at] = (uint8_t)(config->stored - (config->cut_from != config->cut_to ? 1 : 0) +
-                                   (config->block != 0 ? 1 : 0));
+        page[count_at] = config->stored_new;
     }
     config->crc_new = arb_crc32(config->crc_new, page, len);
     config->at = (uint16_t)(at + len);
@@ -417,17 +408,22 @@ static void scan_entry(arb_config_t *config, uint16_t at, const uint8_t entry[PR
     if (code == PROFILE_TLV_CONFIGURATIONS) {
         config->count_at = at;
     }
-    if (code == PROFILE_TLV_END) {
-        config->length_new = (uint16_t)(at + PROFILE_TLV_ENTRY_BYTES);
-    } else if (code != PROFILE_TLV_CONFIGURATION) {
+    if (code != PROFILE_TLV_CONFIGURATION && code != PROFILE_TLV_END) {
         return;
     }
     if (config->cut_to == CONFIG_NOWHERE) {
         config->cut_to = at;
-    } else if (config->cut_to == config->cut_from) { /* not found so far */
+    }
+    if (code == PROFILE_TLV_END) {
+        config->length_new = (uint16_t)(at + PROFILE_TLV_ENTRY_BYTES);
+        if (config->cut_to == 0) {
+            config->cut_from = at;
+            config->cut_to = at;
+        }
+    } else if (entry[1] == config->number) {
         config->cut_from = at;
-        config->cut_to =
-            code == PROFILE_TLV_CONFIGURATION && entry[1] == config->number ? CONFIG_NOWHERE : at;
+        config->cut_to = CONFIG_NOWHERE;
+        config->stored_new--;
     }
 }
 
@@ -519,7 +515,7 @@ static arb_config_status_t step(arb_config_t *config, const arb_nvm_t *nvm)
 
 void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
 {
-    if (config->phase == PHASE_IDLE || pdcp_time_before(now_ms, config->due_ms)) {
+    if (!arb_config_busy(config) || pdcp_time_before(now_ms, config->due_ms)) {
         return;
     }
     const int8_t state = arb_nvm_poll(nvm, ARB_NVM_CONFIG, &config->due_ms, now_ms);

@@ -70,11 +70,12 @@ typedef struct {
     uint16_t length;
     uint32_t crc; /* register behind the string */
     /* The job. */
-    uint8_t phase;  /* what it is at: private to arb_config.c */
+    uint8_t phase;  /* what it is at, 0: there is none; private to arb_config.c */
     bool writing;   /* a page is under way */
     uint8_t polls;  /* of a memory that is not ready */
     uint8_t number; /* save, erase */
     uint8_t count;  /* save: links */
+    uint8_t stored_new;
     uint8_t from;   /* the area that is read */
     bool same;      /* the new string is the stored one so far: none of it was written yet */
     uint16_t at;    /* where in the string that is read, compared or written, */
@@ -106,7 +107,10 @@ void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
 uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms);
 
 /* A job is under way. */
-bool arb_config_busy(const arb_config_t *config);
+static inline bool arb_config_busy(const arb_config_t *config)
+{
+    return config->phase != 0;
+}
 
 /* Whether this configuration is stored. */
 static inline bool arb_config_has(const arb_config_t *config, uint8_t number)

@@ -22,8 +22,6 @@ static const arb_record_t flags_record = {.address = ARB_NVM_FLAGS_AT,
                                           .size = ARB_PORT_NVM_PAGE,
                                           .letter = 'F',
                                           .entry = 1,
-                                          .least = ARB_FLAGS_LENGTH,
-                                          .most = (int)ARB_PORT_NVM_PAGE - ARB_AREA_HEADER - ARB_AREA_CRC,
                                           .put = put_setting,
                                           .take = take_setting};
 
@@ -66,16 +64,21 @@ void arb_flags_step(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms)
     if (status > 0) {
         return;
     }
-    const bool failed = status < 0 && flags->writing != flags->stored;
-    if (!failed && flags->writing != flags->stored) {
-        arb_record_written(&flags->newest);
-        flags->stored = flags->writing;
+    bool failed = false;
+    if (flags->writing != flags->stored) { /* a page was under way */
+        failed = status < 0;
+        if (!failed) {
+            arb_record_written(&flags->newest);
+            flags->stored = flags->writing;
+        }
     }
     if (!failed && flags->flags == flags->stored) {
         arb_nvm_give(nvm, ARB_NVM_FLAGS);
     } else if (failed || !write_record(flags, nvm)) {
         flags->writing = flags->stored;
-        flags->failures = (uint8_t)(flags->failures + (flags->failures != 0xFF ? 1 : 0));
+        if (flags->failures != 0xFF) {
+            flags->failures++;
+        }
         flags->due_ms = now_ms + ARB_FLAGS_RETRY_MS;
         arb_nvm_give(nvm, ARB_NVM_FLAGS);
     }

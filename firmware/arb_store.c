@@ -31,8 +31,6 @@ static const arb_record_t store_record = {.address = 0,
                                           .size = ARB_STORE_AREA,
                                           .letter = 'I',
                                           .entry = ARB_STORE_ENTRY,
-                                          .least = 0,
-                                          .most = PDCP_IDENTITIES_MAX,
                                           .put = put_entry,
                                           .take = take_entry};
 

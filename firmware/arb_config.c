@@ -15,11 +15,11 @@ enum { CONFIG_CHUNK = (int)ARB_CONFIG_READ_MAX / PROFILE_TLV_ENTRY_BYTES * PROFI
 
 typedef enum {
     PHASE_IDLE = 0, /* see arb_config_busy */
-    PHASE_READ,    /* the stored string goes to the sink */
-    PHASE_SCAN,    /* save, erase: where in the stored string what stands */
-    PHASE_COMPARE, /* is the new string what is stored? */
-    PHASE_WRITE,   /* the new string, page by page */
-    PHASE_CHECK,   /* the new string is read back */
+    PHASE_READ,     /* the stored string goes to the sink */
+    PHASE_SCAN,     /* save, erase: where in the stored string what stands */
+    PHASE_COMPARE,  /* is the new string what is stored? */
+    PHASE_WRITE,    /* the new string, page by page */
+    PHASE_CHECK,    /* the new string is read back */
     PHASE_HEADER,
     PHASE_ADOPT /* the header is read back */
 } phase_t;
@@ -134,6 +134,7 @@ static void start(arb_config_t *config, phase_t phase, arb_config_done_t done, v
     config->phase = (uint8_t)phase;
     config->polls = 0;
     config->piece = NULL;
+    config->count_at = CONFIG_NOWHERE;
     config->done = done;
     config->ctx = ctx;
     config->due_ms = now_ms;
@@ -167,11 +168,13 @@ static void start_change(arb_config_t *config, uint8_t number, uint16_t block, a
                          void *ctx, uint32_t now_ms)
 {
     config->number = number;
-    config->stored_new = (uint8_t)(config->stored + (block != 0 ? 1 : 0));
+    config->stored_new = config->stored;
+    if (block != 0) {
+        config->stored_new++;
+    }
     config->block = block;
     config->raw_at = 0;
     config->length_new = 0;
-    config->count_at = CONFIG_NOWHERE;
     config->cut_to = 0;
     start(config, PHASE_SCAN, done, ctx, now_ms);
     open_string(config, config->newest.area, config->length, NULL);
@@ -232,12 +235,10 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
     if (offset == 0) {
         config->length_new = total;
         config->same = total == config->length;
-        config->crc_new = ARB_CRC32_INIT;
     }
     start(config, config->same ? PHASE_COMPARE : PHASE_WRITE, done, ctx, now_ms);
     config->piece = bytes;
     config->raw_at = 0; /* until the piece is in */
-    config->count_at = CONFIG_NOWHERE;
     config->cut_from = offset;
     config->at = offset;
     config->until = (uint16_t)(offset + len);
@@ -321,8 +322,8 @@ static bool put_new(const arb_config_t *config, const arb_nvm_t *nvm, uint8_t *b
 
 /* Phases ------------------------------------------------------------------------------------------------ */
 
-/* Each step is one of these. The job ends with anything but ARB_CONFIG_OK, and when the phase is idle
- * afterwards. */
+/* Each does one step. The job ends with anything but ARB_CONFIG_OK, and when the phase is idle afterwards. */
+typedef arb_config_status_t (*phase_step_t)(arb_config_t *config, const arb_nvm_t *nvm);
 
 /* The new string, or a piece of the host's, has been compared or written to its end. */
 static arb_config_status_t end_part(arb_config_t *config)
@@ -350,23 +351,6 @@ static void begin_write(arb_config_t *config)
     }
 }
 
-static arb_config_status_t step_compare(arb_config_t *config, const arb_nvm_t *nvm)
-{
-    uint8_t stored[CONFIG_CHUNK];
-    uint8_t fresh[CONFIG_CHUNK];
-    const uint16_t len = at_most(CONFIG_CHUNK, (uint16_t)(config->until - config->at));
-    if (!read_string(nvm, config->newest.area, config->at, stored, len) ||
-        !put_new(config, nvm, fresh, len)) {
-        return ARB_CONFIG_ERR_STORAGE;
-    }
-    if (memcmp(stored, fresh, len) != 0) {
-        begin_write(config);
-        return ARB_CONFIG_OK;
-    }
-    config->at = (uint16_t)(config->at + len);
-    return config->at < config->until ? ARB_CONFIG_OK : end_part(config);
-}
-
 static arb_config_status_t write_page(arb_config_t *config, const arb_nvm_t *nvm, uint16_t address,
                                       const uint8_t *bytes, uint16_t len)
 {
@@ -378,25 +362,39 @@ static arb_config_status_t write_page(arb_config_t *config, const arb_nvm_t *nvm
     return ARB_CONFIG_OK;
 }
 
-static arb_config_status_t step_write(arb_config_t *config, const arb_nvm_t *nvm)
+/* Compares or writes the next bytes of the new string. */
+static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
 {
+    uint8_t fresh[ARB_PORT_NVM_PAGE];
     const uint16_t at = config->at;
-    if (at == config->until) {
+    const bool compares = config->phase == PHASE_COMPARE;
+    const uint16_t room = compares ? CONFIG_CHUNK : (uint16_t)(sizeof fresh - at % sizeof fresh);
+    const uint16_t len = at_most(room, (uint16_t)(config->until - at));
+    if (len == 0) {
         return end_part(config);
     }
-    uint8_t page[ARB_PORT_NVM_PAGE];
-    const uint16_t len = at_most((uint16_t)(sizeof page - at % sizeof page), (uint16_t)(config->until - at));
-    if (!put_new(config, nvm, page, len)) {
+    if (!put_new(config, nvm, fresh, len)) {
         return ARB_CONFIG_ERR_STORAGE;
+    }
+    config->at = (uint16_t)(at + len);
+    if (compares) {
+        uint8_t stored[CONFIG_CHUNK];
+        if (!read_string(nvm, config->newest.area, at, stored, len)) {
+            return ARB_CONFIG_ERR_STORAGE;
+        }
+        if (memcmp(stored, fresh, len) != 0) {
+            begin_write(config);
+            return ARB_CONFIG_OK;
+        }
+        return config->at < config->until ? ARB_CONFIG_OK : end_part(config);
     }
     /* In front of the cut, with no more than 255 configurations: the low byte is all that changes. */
     const uint16_t count_at = (uint16_t)(config->count_at + 1 - at);
     if (count_at < len) {
-        page[count_at] = config->stored_new;
+        fresh[count_at] = config->stored_new;
     }
-    config->crc_new = arb_crc32(config->crc_new, page, len);
-    config->at = (uint16_t)(at + len);
-    return write_page(config, nvm, (uint16_t)(string_address(arb_area_next(&config->newest)) + at), page,
+    config->crc_new = arb_crc32(at == 0 ? ARB_CRC32_INIT : config->crc_new, fresh, len);
+    return write_page(config, nvm, (uint16_t)(string_address(arb_area_next(&config->newest)) + at), fresh,
                       len);
 }
 
@@ -438,7 +436,6 @@ static arb_config_status_t end_scan(arb_config_t *config)
     if (config->length_new > ARB_CONFIG_STRING_MAX) {
         return ARB_CONFIG_ERR_STORAGE;
     }
-    config->crc_new = ARB_CRC32_INIT;
     begin_write(config);
     if (config->length_new == config->length) { /* then a block of another length has another last entry */
         config->phase = PHASE_COMPARE;
@@ -497,24 +494,13 @@ static arb_config_status_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm
     return ARB_CONFIG_OK;
 }
 
-static arb_config_status_t step(arb_config_t *config, const arb_nvm_t *nvm)
-{
-    switch ((phase_t)config->phase) {
-    case PHASE_COMPARE:
-        return step_compare(config, nvm);
-    case PHASE_WRITE:
-        return step_write(config, nvm);
-    case PHASE_HEADER:
-        return step_header(config, nvm);
-    case PHASE_ADOPT:
-        return step_adopt(config, nvm);
-    default:
-        return step_read(config, nvm);
-    }
-}
-
 void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
 {
+    static const phase_step_t steps[] = {
+        [PHASE_READ] = step_read,   [PHASE_SCAN] = step_read,  [PHASE_COMPARE] = step_new,
+        [PHASE_WRITE] = step_new,   [PHASE_CHECK] = step_read, [PHASE_HEADER] = step_header,
+        [PHASE_ADOPT] = step_adopt,
+    };
     if (!arb_config_busy(config) || pdcp_time_before(now_ms, config->due_ms)) {
         return;
     }
@@ -526,7 +512,7 @@ void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
     const bool failed = state > 0 || (state < 0 && config->writing);
     config->polls = 0;
     config->writing = false;
-    const arb_config_status_t status = failed ? ARB_CONFIG_ERR_STORAGE : step(config, nvm);
+    const arb_config_status_t status = failed ? ARB_CONFIG_ERR_STORAGE : steps[config->phase](config, nvm);
     if (status != ARB_CONFIG_OK || config->phase == PHASE_IDLE) {
         finish(config, nvm, status);
     } else if (!config->writing) {

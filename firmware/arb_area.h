@@ -42,9 +42,6 @@ static inline uint8_t arb_area_next(const arb_area_t *newest)
 void arb_area_put_header(const arb_area_t *newest, uint8_t letter, uint8_t count,
                          uint8_t header[ARB_AREA_HEADER]);
 
-/* The CRC-32 of what left the register at crc, LSB first. */
-void arb_area_put_crc(uint8_t bytes[ARB_AREA_CRC], uint32_t crc);
-
 /* Records ------------------------------------------------------------------------------------------------ */
 
 enum { ARB_RECORD_ENTRY_MAX = 7 };

@@ -4,11 +4,14 @@
 
 int8_t arb_nvm_poll(arb_nvm_t *nvm, arb_nvm_user_t user, uint32_t *due_ms, uint32_t now_ms)
 {
-    if (pdcp_time_before(now_ms, *due_ms)) {
-        return 1;
+    int8_t status = 1;
+    if (!pdcp_time_before(now_ms, *due_ms)) {
+        *due_ms = now_ms + ARB_NVM_POLL_MS;
+        if (arb_nvm_take(nvm, user)) {
+            status = nvm->port->nvm_status(nvm->port->ctx);
+        }
     }
-    *due_ms = now_ms + ARB_NVM_POLL_MS;
-    return arb_nvm_take(nvm, user) ? nvm->port->nvm_status(nvm->port->ctx) : 1;
+    return status;
 }
 
 void arb_nvm_give(arb_nvm_t *nvm, arb_nvm_user_t user)

@@ -113,6 +113,11 @@ static bool read_area(arb_config_t *config, const arb_nvm_t *nvm, uint8_t area,
     return adopt(config, header);
 }
 
+static void count(arb_config_t *config, arb_config_counter_t counter)
+{
+    config->counters[counter]++;
+}
+
 void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
 {
     memset(config, 0, sizeof *config);
@@ -123,7 +128,7 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
         uint8_t header[ARB_CONFIG_HEADER];
         const arb_area_state_t state = arb_area_open(nvm, header_address(area), 'C', header, sizeof header);
         if (state != ARB_AREA_EMPTY && (state == ARB_AREA_DAMAGED || !read_area(config, nvm, area, header))) {
-            config->counters[ARB_CONFIG_DAMAGED]++;
+            count(config, ARB_CONFIG_DAMAGED);
         }
     }
 }
@@ -146,9 +151,9 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
     config->phase = PHASE_IDLE;
     arb_nvm_give(nvm, ARB_NVM_CONFIG);
     if (status == ARB_CONFIG_UNCHANGED) {
-        config->counters[ARB_CONFIG_COUNT_UNCHANGED]++;
+        count(config, ARB_CONFIG_COUNT_UNCHANGED);
     } else if (status == ARB_CONFIG_ERR_STORAGE) {
-        config->counters[ARB_CONFIG_FAILURES]++;
+        count(config, ARB_CONFIG_FAILURES);
     }
     config->done(config->ctx, status);
 }
@@ -359,7 +364,7 @@ static arb_config_status_t write_page(arb_config_t *config, const arb_nvm_t *nvm
         return ARB_CONFIG_ERR_STORAGE;
     }
     config->writing = true;
-    config->counters[ARB_CONFIG_PAGES]++;
+    count(config, ARB_CONFIG_PAGES);
     return ARB_CONFIG_OK;
 }
 
@@ -491,7 +496,7 @@ static arb_config_status_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm
         config->newest.area != config->from) {
         return ARB_CONFIG_ERR_STORAGE;
     }
-    config->counters[ARB_CONFIG_WRITES]++;
+    count(config, ARB_CONFIG_WRITES);
     return ARB_CONFIG_OK;
 }
 

@@ -64,17 +64,13 @@ void arb_flags_step(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms)
     if (status > 0) {
         return;
     }
-    bool failed = false;
-    if (flags->writing != flags->stored) { /* a page was under way */
-        failed = status < 0;
-        if (!failed) {
-            arb_record_written(&flags->newest);
-            flags->stored = flags->writing;
-        }
+    if (flags->writing != flags->stored && status == 0) { /* the page under way is in the memory */
+        arb_record_written(&flags->newest);
+        flags->stored = flags->writing;
     }
-    if (!failed && flags->flags == flags->stored) {
+    if (is_idle(flags)) {
         arb_nvm_give(nvm, ARB_NVM_FLAGS);
-    } else if (failed || !write_record(flags, nvm)) {
+    } else if (flags->writing != flags->stored || !write_record(flags, nvm)) { /* it or the next one failed */
         flags->writing = flags->stored;
         if (flags->failures != 0xFF) {
             flags->failures++;

@@ -53,15 +53,13 @@ void arb_store_step(arb_store_t *store, const pdcp_bind_t *bind, uint32_t now_ms
     if (status > 0) {
         return;
     }
-    const bool failed = status < 0 && store->copy.written != 0;
-    if (!failed && store->copy.written == arb_record_length(&store_record, bind->remembered_count)) {
+    if (status == 0 && store->copy.written == arb_record_length(&store_record, bind->remembered_count)) {
         arb_record_written(&store->newest);
         store->changed = false;
         arb_nvm_give(store->nvm, ARB_NVM_STORE);
-        return;
-    }
-    if (failed || !arb_record_write(&store_record, store->nvm, &store->newest, bind->remembered_count, bind,
-                                    &store->copy)) {
+    } else if ((status < 0 && store->copy.written != 0) ||
+               !arb_record_write(&store_record, store->nvm, &store->newest, bind->remembered_count, bind,
+                                 &store->copy)) {
         store->failures++;
         arb_store_touch(store, now_ms);
     }

@@ -29,9 +29,8 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
     app->work = true;
     pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
     arb_hostapi_init(&app->api);
-    arb_store_load(&app->store, port, &app->arb.bus.bind);
     arb_nvm_init(&app->nvm, port);
-    arb_store_share(&app->store, &app->nvm);
+    arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
     arb_limb_init(&app->limb, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
                   settings->no_autoconfig ? ARB_FLAG_AUTOCONFIGURE : 0, now_ms);
     app->api.strict = (arb_limb_flags(&app->limb) & ARB_FLAG_STRICT_CRC) != 0;
@@ -115,7 +114,7 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
         app->port->can_restart(app->port->ctx);
     }
     send_frames(app, now_ms);
-    arb_store_step(&app->store, app->port, &app->arb.bus.bind, now_ms);
+    arb_store_step(&app->store, &app->arb.bus.bind, now_ms);
     next_ms = earlier(next_ms, arb_limb_next_ms(&app->limb, &app->arb, now_ms));
     next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
     app->next_ms = earlier(next_ms, arb_store_next_ms(&app->store, now_ms));

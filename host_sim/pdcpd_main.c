@@ -387,7 +387,7 @@ static bool start(daemon_t *daemon)
     arb_app_observe(&daemon->app, on_event, daemon);
     if (daemon->app.store.damaged != 0) {
         say(daemon, PDCPD_LOG_WARNING, "%s: %u of %d copies of the identities are damaged",
-            daemon->options.nvm, daemon->app.store.damaged, ARB_STORE_AREAS);
+            daemon->options.nvm, daemon->app.store.damaged, ARB_AREAS);
     }
     if (daemon->world != NULL && !sim_world_set_app(daemon->world, &daemon->app)) {
         return complain("the simulated bus has no port left");

@@ -30,10 +30,8 @@ typedef enum {
     ARB_ACTION_ADOPT = 8
 } arb_action_t;
 
+/* Small state stands first, as in profile_run_t. */
 typedef struct {
-    profile_run_t run;
-    arb_config_t config;
-    arb_flags_t flags;
     uint8_t flags_on; /* given on the command line: not stored */
     uint8_t flags_off;
     uint8_t active; /* configuration, 0: none */
@@ -56,6 +54,9 @@ typedef struct {
     uint8_t best_both;
     uint8_t best_one;
     const pdcp_arb_t *arb; /* while the memory is being read */
+    arb_flags_t flags;
+    arb_config_t config;
+    profile_run_t run;
 } arb_limb_t;
 
 /* flags_on and flags_off override what is stored. Reads the memory: may block for as long as that takes. */

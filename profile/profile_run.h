@@ -47,13 +47,9 @@ typedef enum {
     PROFILE_FOR_CLEAR    /* no links at all */
 } profile_purpose_t;
 
+/* Small state stands first: on the smallest part, a field that lies farther than 511 bytes from the beginning
+ * costs twice the instructions. */
 typedef struct {
-    profile_links_t links; /* the active configuration */
-    profile_plan_t plan;
-    profile_pair_t banned[PROFILE_BANNED_MAX];
-    uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
-    uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
-    uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
     uint8_t banned_count;
     uint8_t tries;      /* of the link that is being made, this one included */
     uint8_t state;      /* profile_state_t */
@@ -77,6 +73,12 @@ typedef struct {
     uint32_t arrived_ms; /* when the first device came for which a plan is due */
     uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
     uint32_t retry_ms;   /* means something while links are banned */
+    profile_pair_t banned[PROFILE_BANNED_MAX];
+    uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
+    uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
+    uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
+    profile_plan_t plan;
+    profile_links_t links; /* the active configuration */
 } profile_run_t;
 
 void profile_run_init(profile_run_t *run, uint32_t now_ms);

@@ -23,8 +23,11 @@ typedef enum {
 static void apply_flags(arb_limb_t *limb, uint8_t flags)
 {
     limb->in_force = flags & ARB_FLAGS_STORED;
-    limb->run.autoconfigure = (flags & ARB_FLAG_AUTOCONFIGURE) != 0;
-    limb->run.hot_swap = (flags & ARB_FLAG_HOT_SWAP) != 0;
+    limb->run.at_start = PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE;
+    if ((flags & ARB_FLAG_AUTOCONFIGURE) != 0) {
+        limb->run.at_start = PROFILE_PLAN_ALL;
+    }
+    limb->run.at_events = (flags & ARB_FLAG_HOT_SWAP) != 0 ? limb->run.at_start : PROFILE_PLAN_ORIGINALS;
 }
 
 void arb_limb_init(arb_limb_t *limb, arb_nvm_t *nvm, uint8_t flags_on, uint8_t flags_off, uint32_t now_ms)
@@ -88,12 +91,11 @@ void arb_limb_on_written(arb_limb_t *limb, pdcp_arb_t *arb)
 }
 
 /* What was under way has ended. */
-static void end(arb_limb_t *limb, uint8_t error, uint16_t result)
+static void end(arb_limb_t *limb, uint8_t error)
 {
     limb->stage = STAGE_IDLE;
     limb->ended = true;
     limb->error = error;
-    limb->result = result;
 }
 
 static uint8_t error_of(arb_config_status_t status)
@@ -192,7 +194,7 @@ static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
     limb->stage = STAGE_IDLE;
     set_active(limb, number);
     profile_run_start(&limb->run, arb, number != 0);
-    (void)profile_run_take_change(&limb->run); /* what was loaded or read back is not a change to be saved */
+    limb->run.changed = false; /* what was loaded or read back is not a change to be saved */
 }
 
 /* The bus is quiet: the start-up begins. */
@@ -258,7 +260,7 @@ static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
         pdcp_arb_plan_links(arb, true);
         set_active(limb, limb->number);
     }
-    end(limb, error_of((arb_config_status_t)limb->status), 0);
+    end(limb, error_of((arb_config_status_t)limb->status));
 }
 
 static uint8_t begin_load(arb_limb_t *limb, uint32_t now_ms)
@@ -272,7 +274,7 @@ static void end_check(arb_limb_t *limb, uint32_t now_ms)
 {
     if (limb->status != ARB_CONFIG_OK || limb->score > PROFILE_LINKS_MAX ||
         read_all(limb, STAGE_LOAD, now_ms) != ARB_OK) {
-        end(limb, ARB_ERR_STORAGE, 0);
+        end(limb, ARB_ERR_STORAGE);
         return;
     }
     profile_run_load_begin(&limb->run, false);
@@ -287,13 +289,13 @@ static void plan(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what, bool ane
 static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status != ARB_CONFIG_OK) { /* it could be read a moment ago */
-        end(limb, ARB_ERR_STORAGE, 0);
+        end(limb, ARB_ERR_STORAGE);
         return;
     }
     set_active(limb, limb->number);
     pdcp_arb_plan_links(arb, true);
     plan(limb, arb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, true);
-    (void)profile_run_take_change(&limb->run);
+    limb->run.changed = false;
     limb->unsaved = false;
 }
 
@@ -310,7 +312,7 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
             forget_active(limb, arb);
         }
     }
-    end(limb, error_of((arb_config_status_t)limb->status), 0);
+    end(limb, error_of((arb_config_status_t)limb->status));
 }
 
 /* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come.
@@ -321,10 +323,9 @@ static void plan_for_host(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what,
         profile_run_load_begin(&limb->run, false);
     }
     if (limb->run.state == PROFILE_WAITING) {
-        end(limb, ARB_OK, 0);
+        end(limb, ARB_OK);
         return;
     }
-    limb->run.changed = limb->run.changed || clear;
     plan(limb, arb, what, clear);
 }
 
@@ -337,6 +338,7 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
 {
     limb->ended = false;
     limb->error = ARB_OK;
+    limb->result = 0;
     limb->number = argument != 0 ? argument : limb->active;
     switch ((arb_action_t)action) {
     case ARB_ACTION_SAVE:
@@ -358,7 +360,8 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
         plan_for_host(limb, arb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, false);
         return ARB_OK;
     case ARB_ACTION_ADOPT:
-        end(limb, ARB_OK, profile_run_adopt(&limb->run, arb));
+        limb->result = profile_run_adopt(&limb->run, arb);
+        end(limb, ARB_OK);
         return ARB_OK;
     default:
         return ARB_ERR_VALUE;
@@ -372,7 +375,7 @@ void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms,
     if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb */
         set_active(limb, 0);
         if (limb->stage == STAGE_PLAN) { /* what the memory is doing goes on */
-            end(limb, ARB_ERR_NOT_READY, 0);
+            end(limb, ARB_ERR_NOT_READY);
         }
     }
     profile_run_on_event(&limb->run, arb, now_ms, event);
@@ -416,12 +419,13 @@ static bool may_auto_save(const arb_limb_t *limb)
 
 static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    if (profile_run_take_change(&limb->run)) {
+    if (limb->run.changed) {
+        limb->run.changed = false;
         limb->unsaved = true;
-        limb->changed_ms = now_ms;
+        limb->save_ms = now_ms + ARB_LIMB_AUTO_SAVE_MS;
     }
-    if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS)) {
-        limb->changed_ms = now_ms; /* if it fails, again after the same time */
+    if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->save_ms)) {
+        limb->save_ms = now_ms + ARB_LIMB_AUTO_SAVE_MS; /* if it fails, again after the same time */
         limb->number = limb->active;
         (void)begin_save(limb, arb, now_ms);
     }
@@ -440,7 +444,8 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
     }
     const bool handed = profile_run_step(&limb->run, arb, now_ms);
     if (limb->stage == STAGE_PLAN && limb->run.state != PROFILE_CONFIGURING) {
-        end(limb, limb->error, limb->run.moves);
+        limb->result = limb->run.moves;
+        end(limb, limb->error);
     }
     auto_save(limb, arb, now_ms);
     return handed;
@@ -457,7 +462,7 @@ uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_
     next_ms = earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
     next_ms = earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
     if (may_auto_save(limb)) {
-        next_ms = earlier(next_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS);
+        next_ms = earlier(next_ms, limb->save_ms);
     }
     return next_ms;
 }

@@ -41,9 +41,9 @@ typedef struct {
     bool ended;       /* what the host waits for is there: */
     uint8_t error;    /* arb_error_t */
     uint16_t result;
-    bool told;    /* active and stored configurations are as the host knows them */
-    bool unsaved; /* the configuration was changed, for auto-save */
-    uint32_t changed_ms;
+    bool told;             /* active and stored configurations are as the host knows them */
+    bool unsaved;          /* the configuration was changed, for auto-save */
+    uint32_t save_ms;      /* auto-save: when it is due */
     uint8_t best;          /* start-up: the best configuration so far (D-PRO-4) */
     uint16_t best_score;   /* its score, 256 for a link with both ends, 1 for one with one end, */
     uint16_t score;        /* and that of the one that is being read. Load: how many links it has */

@@ -6,11 +6,6 @@
 #include "pdcp_time.h"
 #include "profile_match.h"
 
-static const pdcp_nodes_t *nodes_of(const pdcp_arb_t *arb)
-{
-    return &arb->bus.nodes;
-}
-
 /* Before the start-up. What a plan is made from is set when one is begun. */
 static void wait_for_start(profile_run_t *run, uint32_t now_ms)
 {
@@ -35,13 +30,6 @@ void profile_run_init(profile_run_t *run, uint32_t now_ms)
 bool profile_run_is_busy(const profile_run_t *run)
 {
     return run->state == PROFILE_CONFIGURING || run->due != 0;
-}
-
-bool profile_run_take_change(profile_run_t *run)
-{
-    const bool changed = run->changed;
-    run->changed = false;
-    return changed;
 }
 
 /* --- The active configuration follows what happens --- */
@@ -69,9 +57,11 @@ static bool adopt_link(profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t in
         (!by_host && profile_links_is_claimed(&run->links, &link))) {
         return true;
     }
-    const bool stored = store_link(run, &link, by_host);
-    run->changed = run->changed || stored;
-    return stored;
+    if (!store_link(run, &link, by_host)) {
+        return false;
+    }
+    run->changed = true;
+    return true;
 }
 
 /* Entry whose missing input this one stands in for; PDCP_NONE: it does not. */
@@ -98,7 +88,7 @@ static bool works(const pdcp_nodes_t *nodes, uint8_t input)
 
 bool profile_run_take_up(profile_run_t *run, const pdcp_arb_t *arb)
 {
-    const pdcp_nodes_t *nodes = nodes_of(arb);
+    const pdcp_nodes_t *nodes = &arb->bus.nodes;
     bool complete = true;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         if (works(nodes, i) && entry_of(run, nodes, i) == PDCP_NONE && stood_in_for(run, i) == PDCP_NONE &&
@@ -170,7 +160,7 @@ static uint8_t replaced_by(const profile_run_t *run, const pdcp_nodes_t *nodes, 
 
 uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb)
 {
-    const pdcp_nodes_t *nodes = nodes_of(arb);
+    const pdcp_nodes_t *nodes = &arb->bus.nodes;
     uint8_t adopted = 0;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t entry = works(nodes, i) ? replaced_by(run, nodes, i) : PDCP_NONE;
@@ -196,19 +186,6 @@ static profile_scene_t scene_of(profile_run_t *run, const pdcp_nodes_t *nodes)
     return scene;
 }
 
-/* All that is to be planned, as far as the flags allow it. */
-static uint8_t what_of(const profile_run_t *run, bool replace)
-{
-    uint8_t what = PROFILE_PLAN_ORIGINALS;
-    if (replace) {
-        what |= PROFILE_PLAN_REPLACE;
-        if (run->autoconfigure) {
-            what |= PROFILE_PLAN_AUTO;
-        }
-    }
-    return what;
-}
-
 /* The next plan is due, for what is due already and this. Before the start-up there are none. */
 static void make_due(profile_run_t *run, uint8_t what)
 {
@@ -223,23 +200,23 @@ static void plan_all(profile_run_t *run, uint32_t now_ms)
 {
     run->stirred_ms = now_ms;
     run->banned_count = 0;
-    make_due(run, what_of(run, run->hot_swap));
+    make_due(run, run->at_events);
 }
 
 static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     const bool urgent = run->urgent;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
-        if (nodes_of(arb)->channels[i].node == node) {
+        if (arb->bus.nodes.channels[i].node == node) {
             profile_set_bit(run->dropping, i, false);
         }
     }
     profile_set_bit(run->awaited, node, false);
     if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
-        read_back(run, nodes_of(arb), node);
+        read_back(run, &arb->bus.nodes, node);
     }
     if (run->due == 0) {
-        run->arrived_ms = now_ms;
+        run->arrival_ms = now_ms + PROFILE_ARRIVAL_MS;
     }
     plan_all(run, now_ms);
     run->urgent = urgent;
@@ -297,7 +274,7 @@ static void on_asked(profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t inpu
     }
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, nodes, input)) {
         profile_set_bit(run->made, input, profile_breaks_sole_access(nodes, channel->feed, input));
-        make_due(run, what_of(run, run->hot_swap));
+        make_due(run, run->at_events);
     }
 }
 
@@ -316,7 +293,7 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 /* The link of an input has changed, by whomever. */
 static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
-    const pdcp_nodes_t *nodes = nodes_of(arb);
+    const pdcp_nodes_t *nodes = &arb->bus.nodes;
     const uint8_t entry = entry_of(run, nodes, input);
     const bool dropping = profile_bit(run->dropping, input);
     if (nodes->channels[input].link == PDCP_LINK_NONE) {
@@ -350,7 +327,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         if (run->wishing) {
             on_wish(run, now_ms, (pdcp_status_t)event->status);
         } else if (event->status == PDCP_OK) { /* the host's: what rested for want of it comes back */
-            (void)adopt_link(run, nodes_of(arb), event->channel, true);
+            (void)adopt_link(run, &arb->bus.nodes, event->channel, true);
             make_due(run, PROFILE_PLAN_ORIGINALS);
         }
         break;
@@ -384,7 +361,7 @@ static void leave_unwanted(profile_run_t *run, const pdcp_nodes_t *nodes)
 static void begin_plan(profile_run_t *run, const pdcp_arb_t *arb)
 {
     if (run->state == PROFILE_CONFIGURING && run->making != PROFILE_MAKING) {
-        leave_unwanted(run, nodes_of(arb));
+        leave_unwanted(run, &arb->bus.nodes);
     }
     run->state = PROFILE_CONFIGURING;
     run->due = 0;
@@ -397,7 +374,7 @@ static void begin_plan(profile_run_t *run, const pdcp_arb_t *arb)
  * is done. */
 static void make_slice(profile_run_t *run, const pdcp_arb_t *arb)
 {
-    const profile_scene_t scene = scene_of(run, nodes_of(arb));
+    const profile_scene_t scene = scene_of(run, &arb->bus.nodes);
     if (run->stale || profile_plan_is_stale(&run->plan, &scene)) {
         run->stale = false;
         profile_plan_begin(&run->plan, &scene, run->what);
@@ -424,7 +401,8 @@ void profile_run_begin(profile_run_t *run, const pdcp_arb_t *arb, uint8_t what, 
 {
     memset(run->made, 0, sizeof run->made);
     if (anew) {
-        forget_working(run, nodes_of(arb));
+        forget_working(run, &arb->bus.nodes);
+        run->changed = true;
     }
     run->banned_count = 0;
     run->tries = 0;
@@ -437,15 +415,15 @@ void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored)
 {
     pdcp_arb_plan_links(arb, stored);
     if (!stored) {
-        read_back(run, nodes_of(arb), PDCP_NONE);
+        read_back(run, &arb->bus.nodes, PDCP_NONE);
     }
-    profile_run_begin(run, arb, what_of(run, true), true);
+    profile_run_begin(run, arb, run->at_start, true);
 }
 
 bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_WAITING; i++) {
-        if (nodes_of(arb)->nodes[i].state == PDCP_NODE_READY) {
+        if (arb->bus.nodes.nodes[i].state == PDCP_NODE_READY) {
             return true;
         }
     }
@@ -471,8 +449,8 @@ bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint3
  * link of the configuration whose source is missing as inactive (D-BUS-10). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
-    const pdcp_channel_t *channel = &nodes_of(arb)->channels[input];
-    const uint8_t entry = entry_of(run, nodes_of(arb), input);
+    const pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
+    const uint8_t entry = entry_of(run, &arb->bus.nodes, input);
     pdcp_link_source_t source = {.index = 0};
     if (entry != PDCP_NONE) {
         const profile_ref_t *output = &run->links.entries[entry].output;
@@ -505,7 +483,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
 static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (run->plan.want[i] == PDCP_NONE && profile_is_ready(nodes_of(arb), i, PDCP_INPUT)) {
+        if (run->plan.want[i] == PDCP_NONE && profile_is_ready(&arb->bus.nodes, i, PDCP_INPUT)) {
             unlink_one(run, arb, now_ms, i);
         }
     }
@@ -552,7 +530,7 @@ static bool carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     if (!pdcp_arb_links_settled(arb)) {
         return true;
     }
-    const uint8_t input = next_input(run, nodes_of(arb));
+    const uint8_t input = next_input(run, &arb->bus.nodes);
     if (input == PDCP_NONE) {
         finish(run, arb);
         return false;
@@ -598,8 +576,7 @@ static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
 static bool is_held_back(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     return run->what == PROFILE_PLAN_ENFORCE ||
-           (!run->urgent && pdcp_arb_setup_running(arb) &&
-            pdcp_time_before(now_ms, run->arrived_ms + PROFILE_ARRIVAL_MS));
+           (!run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms));
 }
 
 bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
@@ -639,7 +616,7 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);
     if (run->due != 0 && run->state != PROFILE_CONFIGURING && is_held_back(run, arb, now_ms)) {
-        return earlier(next_ms, run->arrived_ms + PROFILE_ARRIVAL_MS);
+        return earlier(next_ms, run->arrival_ms);
     }
     return next_ms;
 }

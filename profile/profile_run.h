@@ -40,6 +40,9 @@ typedef enum {
 /* Small state stands first: on the smallest part, a field that lies farther than 511 bytes from the beginning
  * costs twice the instructions. */
 typedef struct {
+    uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
+    uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
+    uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
     uint8_t banned_count;
     uint8_t tries;       /* of the link that is being made, those before this one */
     uint8_t state;       /* profile_state_t */
@@ -50,19 +53,17 @@ typedef struct {
     bool wishing;        /* a link has been asked for, */
     profile_pair_t wish; /* this one */
     bool urgent;         /* the plan that is due does not wait for devices being set up; never without due */
-    bool autoconfigure;  /* flags of 2404h */
-    bool hot_swap;
+    uint8_t at_start;    /* what may be planned at the start-up, */
+    uint8_t at_events;   /* and when devices come or go: profile_plan_what_t, by the flags of 2404h */
     bool frozen;         /* the configuration must not change; profile_run_take_up when it may again */
-    bool changed;        /* the configuration has changed since profile_run_take_change */
+    bool changed;        /* the configuration has changed; the owner resets it */
     uint16_t moves;      /* links made or taken away by this plan */
     uint32_t stirred_ms; /* when a setup ended last */
-    uint32_t arrived_ms; /* when the first device came for which a plan is due */
+    uint32_t
+        arrival_ms; /* the plan that is due waits so long for devices being set up, unless it is urgent */
     uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
     uint32_t retry_ms;   /* means something while links are banned */
     profile_pair_t banned[PROFILE_BANNED_MAX];
-    uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
-    uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
-    uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
     profile_plan_t plan;
     profile_links_t links; /* the active configuration */
 } profile_run_t;
@@ -109,8 +110,5 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
 
 /* Is a plan due or being carried out? */
 bool profile_run_is_busy(const profile_run_t *run);
-
-/* Has the active configuration changed since the last call? */
-bool profile_run_take_change(profile_run_t *run);
 
 #endif

@@ -36,8 +36,7 @@ void setUp(void)
     }
     app.arb.bus.nodes = s.nodes;
     app.limb.run.state = PROFILE_RUNNING;
-    app.limb.run.autoconfigure = true;
-    app.limb.run.hot_swap = true;
+    app.limb.run.at_events = PROFILE_PLAN_ALL;
 }
 
 void tearDown(void) {}

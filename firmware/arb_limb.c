@@ -247,7 +247,9 @@ static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_
     }
     const arb_config_status_t status =
         arb_config_save(&limb->config, &limb->number, limb->run.links.count, get_link, on_done, limb, now_ms);
-    limb->run.frozen = status == ARB_CONFIG_OK;
+    if (status == ARB_CONFIG_OK) {
+        limb->run.frozen = true;
+    }
     return started(limb, STAGE_SAVE, status);
 }
 
@@ -336,6 +338,7 @@ bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb)
 
 uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t action, uint8_t argument)
 {
+    uint8_t what = PROFILE_PLAN_ENFORCE;
     limb->ended = false;
     limb->error = ARB_OK;
     limb->result = 0;
@@ -347,25 +350,24 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
         return begin_load(limb, now_ms);
     case ARB_ACTION_ERASE:
         return begin_erase(limb, now_ms);
-    case ARB_ACTION_AUTOCONFIGURE:
-        plan_for_host(limb, arb, PROFILE_PLAN_AUTO, false);
-        return ARB_OK;
-    case ARB_ACTION_CLEAR:
-        plan_for_host(limb, arb, PROFILE_PLAN_ENFORCE, true);
-        return ARB_OK;
-    case ARB_ACTION_ENFORCE:
-        plan_for_host(limb, arb, PROFILE_PLAN_ENFORCE, false);
-        return ARB_OK;
-    case ARB_ACTION_REPLACE:
-        plan_for_host(limb, arb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, false);
-        return ARB_OK;
     case ARB_ACTION_ADOPT:
         limb->result = profile_run_adopt(&limb->run, arb);
         end(limb, ARB_OK);
         return ARB_OK;
+    case ARB_ACTION_AUTOCONFIGURE:
+        what = PROFILE_PLAN_AUTO;
+        break;
+    case ARB_ACTION_REPLACE:
+        what = PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE;
+        break;
+    case ARB_ACTION_CLEAR:
+    case ARB_ACTION_ENFORCE:
+        break;
     default:
         return ARB_ERR_VALUE;
     }
+    plan_for_host(limb, arb, what, action == ARB_ACTION_CLEAR);
+    return ARB_OK;
 }
 
 /* --- What is due --- */

@@ -42,7 +42,7 @@ typedef struct {
 } profile_entry_t;
 
 typedef struct {
-    uint8_t count;                           /* of entries */
+    uint8_t count;
     profile_part_t parts[PROFILE_PARTS_MAX]; /* in use: those that an entry names */
     profile_entry_t entries[PROFILE_LINKS_MAX];
 } profile_links_t;

@@ -200,6 +200,7 @@ static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
 /* The bus is quiet: the start-up begins. */
 static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
 {
+    limb->arb = arb;
     limb->best = 0;
     limb->best_score = 0;
     limb->number = 0;
@@ -435,7 +436,6 @@ static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 
 bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t now_ms)
 {
-    limb->arb = arb;
     arb_config_step(&limb->config, nvm, now_ms);
     arb_flags_step(&limb->flags, nvm, now_ms);
     if (limb->done) {

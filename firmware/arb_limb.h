@@ -47,7 +47,7 @@ typedef struct {
     uint8_t best;          /* start-up: the best configuration so far (D-PRO-4) */
     uint16_t best_score;   /* its score, 256 for a link with both ends, 1 for one with one end, */
     uint16_t score;        /* and that of the one that is being read. Load: how many links it has */
-    const pdcp_arb_t *arb; /* while the memory is being read */
+    const pdcp_arb_t *arb; /* of the start-up */
     arb_flags_t flags;
     arb_config_t config;
     profile_run_t run;

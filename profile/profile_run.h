@@ -59,8 +59,7 @@ typedef struct {
     bool changed;        /* the configuration has changed; the owner resets it */
     uint16_t moves;      /* links made or taken away by this plan */
     uint32_t stirred_ms; /* when a setup ended last */
-    uint32_t
-        arrival_ms; /* the plan that is due waits so long for devices being set up, unless it is urgent */
+    uint32_t arrival_ms; /* the plan that is due waits so long at most, unless it is urgent */
     uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
     uint32_t retry_ms;   /* means something while links are banned */
     profile_pair_t banned[PROFILE_BANNED_MAX];

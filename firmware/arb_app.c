@@ -108,7 +108,9 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
     do {
         next_ms = pdcp_arb_step(&app->arb, now_ms);
         again = arb_limb_step(&app->limb, &app->arb, &app->nvm, now_ms);
-        again = arb_hostapi_step(&app->api, &env, now_ms) || again;
+        if (arb_hostapi_step(&app->api, &env, now_ms)) {
+            again = true;
+        }
     } while (again);
     if (pdcp_arb_take_restart(&app->arb) && app->port->can_restart != NULL) {
         app->port->can_restart(app->port->ctx);

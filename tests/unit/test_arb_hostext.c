@@ -329,7 +329,7 @@ static void test_the_active_configuration_is_written_away(void)
     wait_for_answer();
     expect(0x240E, NULL, 0);
     TEST_ASSERT_EQUAL(0, app.limb.active);
-    TEST_ASSERT_FALSE(app.limb.run.stored);
+    TEST_ASSERT_FALSE(app.arb.bus.link.stored);
     TEST_ASSERT_FALSE(app.arb.bus.link.stored);
 }
 

@@ -96,7 +96,6 @@ static void take_down(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     device->state = PDCP_NODE_LOST;
-    device->setup_due = false;
     pdcp_request_cancel(&arb->bus, node);
     pdcp_link_on_lost(&arb->bus, node);
     reset_ends(arb, node, PDCP_ERR_NO_ANSWER);
@@ -152,16 +151,8 @@ static void start_host_request(pdcp_arb_t *arb)
     }
     host->waiting = false;
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_HOST);
-    if (host->raw) {
-        pdcp_request_raw(&arb->bus, host->node, PDCP_CLIENT_HOST, host->bytes, (uint8_t)host->size);
-    } else if (host->code == PDCP_SET_PARAMETER) {
-        pdcp_request_set(&arb->bus, host->node, PDCP_CLIENT_HOST, host->channel, host->param, host->bytes,
-                         host->size);
-    } else if (host->code == PDCP_GET_PARAMETER) {
-        pdcp_request_get(&arb->bus, host->node, PDCP_CLIENT_HOST, host->channel, host->param, host->size);
-    } else {
-        pdcp_request_command(&arb->bus, host->node, PDCP_CLIENT_HOST, host->code, host->size);
-    }
+    pdcp_request_start(&arb->bus, host->node, host->raw ? PDCP_CLIENT_RAW : PDCP_CLIENT_HOST, host->code,
+                       host->channel, host->param, host->bytes, host->size);
 }
 
 /* A device's place may have become free for its next request: the check of its identity comes first, then the
@@ -188,13 +179,7 @@ static void serve(pdcp_arb_t *arb, uint8_t node)
     if (device->state == PDCP_NODE_FAILED && !paused) {
         pdcp_setup_start(&arb->bus, node);
     }
-    if (device->state != PDCP_NODE_SETUP) {
-        return;
-    }
-    if (!device->setup_due && !paused) {
-        device->setup_due = true; /* the pause after a failed attempt is over */
-    }
-    if (device->setup_due) {
+    if (device->state == PDCP_NODE_SETUP && !paused) {
         pdcp_setup_ask(&arb->bus, node);
     }
 }
@@ -349,8 +334,7 @@ static void host_has_set(pdcp_arb_t *arb, const uint8_t *value, uint16_t len)
 {
     const pdcp_host_request_t *host = &arb->host;
     if (host->channel == 0) {
-        pdcp_setup_take_time(node_of(arb, host->node), host->param, value,
-                             (uint8_t)(len < PDCP_VALUE_MAX ? len : PDCP_VALUE_MAX));
+        pdcp_setup_take_time(node_of(arb, host->node), host->param, pdcp_value_u16(value, len, 0));
         expect_life(arb, host->node);
         return;
     }
@@ -454,6 +438,7 @@ static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
         pdcp_link_on_reply(&arb->bus, reply);
         break;
     case PDCP_CLIENT_HOST:
+    case PDCP_CLIENT_RAW:
         host_on_reply(arb, reply);
         break;
     case PDCP_CLIENT_RESET:

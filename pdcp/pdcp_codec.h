@@ -63,8 +63,8 @@ void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame);
 /* Little-endian fields of parameter values. A value may be shorter or longer than its field: missing bytes
  * are 0, extra ones are ignored (pdcp-bus.md 4). len is the number of bytes there are, at is where the field
  * begins. */
-uint8_t pdcp_value_u8(const uint8_t *value, uint8_t len, uint8_t at);
-uint16_t pdcp_value_u16(const uint8_t *value, uint8_t len, uint8_t at);
+uint8_t pdcp_value_u8(const uint8_t *value, uint16_t len, uint16_t at);
+uint16_t pdcp_value_u16(const uint8_t *value, uint16_t len, uint16_t at);
 void pdcp_put_u16(uint8_t *bytes, uint16_t word);
 
 bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b);

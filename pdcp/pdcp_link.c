@@ -544,7 +544,8 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     switch ((step_t)bus->link.step) {
     case STEP_READ_VID_PID:
     case STEP_READ_SERIAL:
-        pdcp_nodes_take_source(input, reply->param, reply->bytes, (uint8_t)reply->len);
+        pdcp_nodes_take_source(input, reply->param, pdcp_value_u16(reply->bytes, reply->len, 0),
+                               pdcp_value_u16(reply->bytes, reply->len, 2));
         break;
     case STEP_INPUT_OFF:
         input->enabled = false;

@@ -2,14 +2,22 @@
 
 #include <string.h>
 
+/* Makes a place free. */
+static void clear_place(pdcp_node_t *node, uint8_t place)
+{
+    memset(node, 0, sizeof *node);
+    node->place = place;
+    node->first_channel = PDCP_NONE;
+}
+
 void pdcp_nodes_init(pdcp_nodes_t *nodes)
 {
     memset(nodes, 0, sizeof *nodes);
     for (uint16_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         nodes->channels[i].node = PDCP_NONE;
     }
-    for (uint16_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        nodes->nodes[i].first_channel = PDCP_NONE;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        clear_place(&nodes->nodes[i], i);
     }
 }
 
@@ -24,7 +32,7 @@ uint8_t pdcp_nodes_find(const pdcp_nodes_t *nodes, const pdcp_identity_t *identi
     return PDCP_NONE;
 }
 
-static uint8_t free_place(const pdcp_nodes_t *nodes)
+uint8_t pdcp_nodes_free_place(const pdcp_nodes_t *nodes)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         if (nodes->nodes[i].state == PDCP_NODE_FREE) {
@@ -34,32 +42,19 @@ static uint8_t free_place(const pdcp_nodes_t *nodes)
     return PDCP_NONE;
 }
 
-bool pdcp_nodes_has_place(const pdcp_nodes_t *nodes)
+void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id)
 {
-    return free_place(nodes) != PDCP_NONE;
-}
-
-uint8_t pdcp_nodes_add(pdcp_nodes_t *nodes, const pdcp_identity_t *identity, uint8_t node_id)
-{
-    const uint8_t place = free_place(nodes);
-    if (place == PDCP_NONE) {
-        return PDCP_NONE;
-    }
     pdcp_node_t *node = &nodes->nodes[place];
-    memset(node, 0, sizeof *node);
     node->state = PDCP_NODE_SETUP;
     node->identity = *identity;
     node->node_id = node_id;
-    node->first_channel = PDCP_NONE;
     node->beacon_ms = PDCP_BEACON_MS;
     node->ack_ms = PDCP_ACK_MS;
     nodes->owner[node_id] = (uint8_t)(place + 1);
-    return place;
 }
 
-static void drop_needs(pdcp_nodes_t *nodes, uint8_t node)
+static void drop_needs(pdcp_nodes_t *nodes, pdcp_node_t *gone)
 {
-    pdcp_node_t *gone = &nodes->nodes[node];
     const uint16_t size = (uint16_t)(2u * gone->needs_stride * gone->channel_count);
     if (size == 0) {
         return;
@@ -106,39 +101,28 @@ static void free_channel(pdcp_nodes_t *nodes, uint8_t channel)
 }
 
 /* Frees the channels of a device from the one with index count + 1 on. */
-static void cut_channels(pdcp_nodes_t *nodes, uint8_t node, uint8_t count)
+static void cut_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t count)
 {
-    uint8_t *link = &nodes->nodes[node].first_channel;
-    while (*link != PDCP_NONE && nodes->channels[*link].index <= count) {
-        link = &nodes->channels[*link].next;
-    }
-    uint8_t channel = *link;
-    *link = PDCP_NONE;
-    while (channel != PDCP_NONE) {
-        const uint8_t next = nodes->channels[channel].next;
-        free_channel(nodes, channel);
-        channel = next;
+    uint8_t *link = &owner->first_channel;
+    while (*link != PDCP_NONE) {
+        const uint8_t number = *link;
+        pdcp_channel_t *channel = &nodes->channels[number];
+        if (channel->index <= count) {
+            link = &channel->next;
+        } else {
+            *link = channel->next;
+            free_channel(nodes, number);
+        }
     }
 }
 
 void pdcp_nodes_remove(pdcp_nodes_t *nodes, uint8_t node)
 {
-    drop_needs(nodes, node);
-    cut_channels(nodes, node, 0);
-    nodes->owner[nodes->nodes[node].node_id] = 0;
-    memset(&nodes->nodes[node], 0, sizeof nodes->nodes[node]);
-    nodes->nodes[node].first_channel = PDCP_NONE;
-}
-
-static uint8_t free_channels(const pdcp_nodes_t *nodes)
-{
-    uint8_t count = 0;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (nodes->channels[i].node == PDCP_NONE) {
-            count++;
-        }
-    }
-    return count;
+    pdcp_node_t *gone = &nodes->nodes[node];
+    drop_needs(nodes, gone);
+    cut_channels(nodes, gone, 0);
+    nodes->owner[gone->node_id] = 0;
+    clear_place(gone, node);
 }
 
 void pdcp_nodes_clear_source(pdcp_channel_t *input)
@@ -151,10 +135,8 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
     input->source_profile = 0;
 }
 
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len)
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
 {
-    const uint16_t low = pdcp_value_u16(value, len, 0);
-    const uint16_t high = pdcp_value_u16(value, len, 2);
     if (param == PDCP_IN_SOURCE_VID_PID) {
         input->source.vid = low;
         input->source.pid = high;
@@ -167,39 +149,46 @@ void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t 
     }
 }
 
-/* The first free one from number i on. */
-static uint8_t take_channel(pdcp_nodes_t *nodes, uint8_t node, uint8_t index, uint8_t i)
+/* Makes a free entry of the pool a channel that nothing is known of. */
+static void make_channel(pdcp_channel_t *channel, uint8_t node, uint16_t index)
 {
-    while (nodes->channels[i].node != PDCP_NONE) {
-        i++;
-    }
-    pdcp_channel_t *channel = &nodes->channels[i];
     memset(channel, 0, sizeof *channel);
     channel->node = node;
-    channel->index = index;
+    channel->index = (uint8_t)index;
     channel->next = PDCP_NONE;
     channel->feed = PDCP_NONE;
     pdcp_nodes_clear_source(channel);
-    return i;
+}
+
+/* Gives a device what it lacks of count channels. False: the pool is used up. */
+static bool append_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t count)
+{
+    uint8_t *link = &owner->first_channel;
+    while (*link != PDCP_NONE) {
+        link = &nodes->channels[*link].next;
+    }
+    uint16_t index = owner->channel_count + 1u;
+    for (uint8_t i = 0; index <= count && i < PDCP_CHANNELS_MAX; i++) {
+        pdcp_channel_t *channel = &nodes->channels[i];
+        if (channel->node == PDCP_NONE) {
+            make_channel(channel, owner->place, index);
+            *link = i;
+            link = &channel->next;
+            index++;
+        }
+    }
+    return index > count;
 }
 
 bool pdcp_nodes_set_channels(pdcp_nodes_t *nodes, uint8_t node, uint8_t count)
 {
     pdcp_node_t *owner = &nodes->nodes[node];
-    if (count > owner->channel_count && count - owner->channel_count > free_channels(nodes)) {
+    if (!append_channels(nodes, owner, count)) {
+        cut_channels(nodes, owner, owner->channel_count);
         return false;
     }
-    drop_needs(nodes, node);
-    cut_channels(nodes, node, count);
-    uint8_t *link = &owner->first_channel;
-    uint8_t from = 0;
-    for (uint16_t index = 1; index <= count; index++) {
-        if (*link == PDCP_NONE) {
-            *link = take_channel(nodes, node, (uint8_t)index, from);
-            from = *link;
-        }
-        link = &nodes->channels[*link].next;
-    }
+    drop_needs(nodes, owner);
+    cut_channels(nodes, owner, count);
     owner->channel_count = count;
     return true;
 }
@@ -220,7 +209,7 @@ bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node)
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
         inputs = (uint16_t)(inputs + (nodes->channels[c].transfer == PDCP_INPUT ? 1u : 0u));
     }
-    drop_needs(nodes, node);
+    drop_needs(nodes, owner);
     const uint16_t stride = (uint16_t)((inputs + 7u) / 8u);
     const uint16_t size = (uint16_t)(2u * stride * owner->channel_count);
     if (size > PDCP_NEEDS_BYTES - nodes->needs_used) {
@@ -233,96 +222,71 @@ bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node)
     return true;
 }
 
-/* Where the bit of the input with this index stands in a set of its device; 8 * stride or more: it is no
- * input. */
-static uint16_t need_bit(const pdcp_nodes_t *nodes, uint8_t node, uint8_t index)
+/* Where the channel's set of required or desired inputs begins. */
+static uint16_t set_at(const pdcp_node_t *owner, const pdcp_channel_t *channel, bool desired)
 {
-    uint16_t bit = 0;
-    for (uint8_t c = nodes->nodes[node].first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-        const bool is_input = nodes->channels[c].transfer == PDCP_INPUT;
-        if (nodes->channels[c].index == index) {
-            return is_input ? bit : 0xFFFFu;
-        }
-        bit = (uint16_t)(bit + (is_input ? 1u : 0u));
-    }
-    return 0xFFFFu;
+    const uint16_t set = (uint16_t)(2u * (channel->index - 1u) + (desired ? 1u : 0u));
+    return (uint16_t)(owner->needs_at + set * owner->needs_stride);
 }
 
-static uint16_t set_at(const pdcp_nodes_t *nodes, uint8_t channel, bool desired)
+static uint8_t mask_of(uint16_t bit)
 {
-    const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
-    const uint16_t set = (uint16_t)(2u * (nodes->channels[channel].index - 1u) + (desired ? 1u : 0u));
-    return (uint16_t)(owner->needs_at + set * owner->needs_stride);
+    return (uint8_t)(0x80u >> (bit % 8u));
 }
 
 void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
                           const uint8_t *bytes, uint16_t len)
 {
-    const uint8_t node = nodes->channels[channel].node;
-    const uint16_t bits = (uint16_t)(8u * nodes->nodes[node].needs_stride);
-    uint8_t *set = &nodes->needs[set_at(nodes, channel, desired)];
-    for (uint16_t i = 0; i < len && offset + i < 32; i++) {
-        for (uint8_t b = 0; b < 8; b++) {
-            const uint8_t index = (uint8_t)(8u * (offset + i) + b);
-            const uint16_t bit = need_bit(nodes, node, index);
-            if ((bytes[i] & (0x80u >> b)) != 0 && bit < bits) {
-                set[bit / 8] = (uint8_t)(set[bit / 8] | (0x80u >> (bit % 8)));
+    const pdcp_channel_t *needing = &nodes->channels[channel];
+    const pdcp_node_t *owner = &nodes->nodes[needing->node];
+    uint8_t *set = &nodes->needs[set_at(owner, needing, desired)];
+    uint16_t bit = 0; /* of an input in a set of its device */
+    for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
+        const pdcp_channel_t *input = &nodes->channels[c];
+        if (input->transfer == PDCP_INPUT) {
+            const uint16_t from = (uint16_t)(input->index - 8u * offset); /* large before the offset */
+            if (from / 8u < len && (bytes[from / 8u] & mask_of(from)) != 0) {
+                set[bit / 8u] |= mask_of(bit);
             }
+            bit++;
         }
     }
 }
 
 bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index)
 {
-    const uint8_t node = nodes->channels[channel].node;
-    const uint16_t bit = need_bit(nodes, node, index);
-    if (bit >= 8u * nodes->nodes[node].needs_stride) {
-        return false;
-    }
-    return (nodes->needs[set_at(nodes, channel, desired) + bit / 8] & (0x80u >> (bit % 8))) != 0;
-}
-
-/* Walks over the devices that count: returns the number-th and, in *count, how many there were up to it. */
-static uint8_t walk_devices(const pdcp_nodes_t *nodes, uint8_t number, uint8_t *count)
-{
-    *count = 0;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (pdcp_nodes_device_counts(&nodes->nodes[i]) && ++*count == number) {
-            return i;
+    const pdcp_channel_t *needing = &nodes->channels[channel];
+    const pdcp_node_t *owner = &nodes->nodes[needing->node];
+    const uint8_t *set = &nodes->needs[set_at(owner, needing, desired)];
+    uint16_t bit = 0;
+    for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
+        const pdcp_channel_t *input = &nodes->channels[c];
+        if (input->transfer == PDCP_INPUT) {
+            if (input->index == index) {
+                return owner->needs_stride != 0 && (set[bit / 8u] & mask_of(bit)) != 0;
+            }
+            bit++;
         }
     }
-    return PDCP_NONE;
+    return false;
 }
 
-uint8_t pdcp_nodes_nth_device(const pdcp_nodes_t *nodes, uint8_t number)
-{
-    uint8_t count;
-    return walk_devices(nodes, number, &count);
-}
-
-uint8_t pdcp_nodes_count_devices(const pdcp_nodes_t *nodes)
-{
-    uint8_t count;
-    (void)walk_devices(nodes, 0, &count);
-    return count;
-}
-
-/* Links do not have a direction: 0 stands for them. */
-static bool channel_counts(const pdcp_nodes_t *nodes, const pdcp_channel_t *channel, uint8_t transfer)
-{
-    const pdcp_node_t *owner = &nodes->nodes[channel->node];
-    if (transfer == 0) {
-        return channel->link != PDCP_LINK_NONE;
-    }
-    return owner->beaconed && owner->state == PDCP_NODE_READY && channel->transfer == transfer;
-}
-
-static uint8_t walk_channels(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_t number, uint8_t *count)
+/* Walks over the places in their order and each device's channels: returns the number-th that counts and, in
+ * *count, how many there were up to it. */
+static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number, uint8_t *count)
 {
     *count = 0;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        for (uint8_t c = nodes->nodes[i].first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-            if (channel_counts(nodes, &nodes->channels[c], transfer) && ++*count == number) {
+        const pdcp_node_t *node = &nodes->nodes[i];
+        if (kind == PDCP_COUNTS_DEVICE && pdcp_nodes_device_counts(node) && ++*count == number) {
+            return i;
+        }
+        const bool counts = node->beaconed && node->state == PDCP_NODE_READY;
+        for (uint8_t c = node->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
+            const pdcp_channel_t *channel = &nodes->channels[c];
+            const bool is_one = kind == PDCP_COUNTS_LINK ? channel->link != PDCP_LINK_NONE
+                                                         : counts && channel->transfer == kind;
+            if (is_one && ++*count == number) {
                 return c;
             }
         }
@@ -330,25 +294,15 @@ static uint8_t walk_channels(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_
     return PDCP_NONE;
 }
 
-uint8_t pdcp_nodes_nth_channel(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_t number)
+uint8_t pdcp_nodes_nth(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
 {
     uint8_t count;
-    return walk_channels(nodes, transfer, number, &count);
+    return walk(nodes, kind, number, &count);
 }
 
-uint8_t pdcp_nodes_count_channels(const pdcp_nodes_t *nodes, uint8_t transfer)
+uint8_t pdcp_nodes_count(const pdcp_nodes_t *nodes, uint8_t kind)
 {
     uint8_t count;
-    (void)walk_channels(nodes, transfer, 0, &count);
+    (void)walk(nodes, kind, 0, &count);
     return count;
-}
-
-uint8_t pdcp_nodes_nth_link(const pdcp_nodes_t *nodes, uint8_t number)
-{
-    return pdcp_nodes_nth_channel(nodes, 0, number);
-}
-
-uint8_t pdcp_nodes_count_links(const pdcp_nodes_t *nodes)
-{
-    return pdcp_nodes_count_channels(nodes, 0);
 }

@@ -32,6 +32,7 @@ typedef struct {
     uint32_t heard_ms;    /* last frame from it */
     uint16_t needs_at;    /* its block in the pool of needs */
     uint8_t needs_stride; /* bytes of one set: (inputs + 7) / 8; 0: it has no block */
+    uint8_t place;        /* its own number in the table */
     uint8_t state;        /* pdcp_node_state_t */
     uint8_t node_id;
     uint8_t channel_count;
@@ -42,7 +43,6 @@ typedef struct {
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
     uint8_t asked_id;      /* with this id */
     bool setup_again;      /* it was left before: tried once more, silently (D-BUS-17) */
-    bool setup_due;        /* the next request of the setup is to be sent */
     uint8_t setup_pass;    /* pdcp_setup.c */
     uint8_t setup_step;
     uint8_t setup_channel;
@@ -101,11 +101,11 @@ void pdcp_nodes_init(pdcp_nodes_t *nodes);
 /* Place of the device with this identity, in any state but free; PDCP_NONE: there is none. */
 uint8_t pdcp_nodes_find(const pdcp_nodes_t *nodes, const pdcp_identity_t *identity);
 
-/* Is there a place for one more device? */
-bool pdcp_nodes_has_place(const pdcp_nodes_t *nodes);
+/* A place for one more device; PDCP_NONE: there is none. */
+uint8_t pdcp_nodes_free_place(const pdcp_nodes_t *nodes);
 
-/* Takes a free place for a device with this node id, which must be free. PDCP_NONE: all places are taken. */
-uint8_t pdcp_nodes_add(pdcp_nodes_t *nodes, const pdcp_identity_t *identity, uint8_t node_id);
+/* Takes a free place for a device with this node id, which must be free. */
+void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id);
 
 /* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
  * nothing. */
@@ -121,16 +121,17 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
 /* Makes the source of an input that of an unconnected one (D-BUS-7). */
 void pdcp_nodes_clear_source(pdcp_channel_t *input);
 
-/* Takes over a parameter that names the source of an input: 5, 6 or 8. */
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, const uint8_t *value, uint8_t len);
+/* Takes over a parameter that names the source of an input, 5, 6 or 8: the first and the second of its words.
+ */
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */
 bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
 
 /* Stores bytes of a bit string of required (desired = false) or desired channels: bit 7 of byte 0 is channel
- * index 0 (D-BUS-8). offset: of bytes[0] in the string. Bits of channels that are no inputs of the device are
- * dropped (D-BUS-13). */
+ * index 0 (D-BUS-8). offset: of bytes[0] in the string, below PDCP_PARAMETER_MAX. Bits of channels that are
+ * no inputs of the device are dropped (D-BUS-13). */
 void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
                           const uint8_t *bytes, uint16_t len);
 
@@ -158,16 +159,47 @@ static inline bool pdcp_nodes_device_counts(const pdcp_node_t *node)
     return node->beaconed && node->state != PDCP_NODE_FREE && node->state != PDCP_NODE_LOST;
 }
 
-/* The number-th (from 1) device, input (PDCP_INPUT), output (PDCP_OUTPUT) or link that counts for the host;
- * PDCP_NONE: there are fewer. A link is named by its input's channel number. Order: places, then channel
- * indices. */
-uint8_t pdcp_nodes_nth_device(const pdcp_nodes_t *nodes, uint8_t number);
-uint8_t pdcp_nodes_nth_channel(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_t number);
-uint8_t pdcp_nodes_nth_link(const pdcp_nodes_t *nodes, uint8_t number);
+/* What counts for the host. A link is named by its input's channel number. */
+enum {
+    PDCP_COUNTS_LINK = 0,
+    PDCP_COUNTS_INPUT = PDCP_INPUT,
+    PDCP_COUNTS_OUTPUT = PDCP_OUTPUT,
+    PDCP_COUNTS_DEVICE
+};
 
-/* How many of them there are. */
-uint8_t pdcp_nodes_count_devices(const pdcp_nodes_t *nodes);
-uint8_t pdcp_nodes_count_channels(const pdcp_nodes_t *nodes, uint8_t transfer);
-uint8_t pdcp_nodes_count_links(const pdcp_nodes_t *nodes);
+/* The number-th (from 1) of what counts, and how many there are. PDCP_NONE: there are fewer. Order: places,
+ * then channel indices. */
+uint8_t pdcp_nodes_nth(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number);
+uint8_t pdcp_nodes_count(const pdcp_nodes_t *nodes, uint8_t kind);
+
+static inline uint8_t pdcp_nodes_nth_device(const pdcp_nodes_t *nodes, uint8_t number)
+{
+    return pdcp_nodes_nth(nodes, PDCP_COUNTS_DEVICE, number);
+}
+
+static inline uint8_t pdcp_nodes_nth_channel(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_t number)
+{
+    return pdcp_nodes_nth(nodes, transfer, number);
+}
+
+static inline uint8_t pdcp_nodes_nth_link(const pdcp_nodes_t *nodes, uint8_t number)
+{
+    return pdcp_nodes_nth(nodes, PDCP_COUNTS_LINK, number);
+}
+
+static inline uint8_t pdcp_nodes_count_devices(const pdcp_nodes_t *nodes)
+{
+    return pdcp_nodes_count(nodes, PDCP_COUNTS_DEVICE);
+}
+
+static inline uint8_t pdcp_nodes_count_channels(const pdcp_nodes_t *nodes, uint8_t transfer)
+{
+    return pdcp_nodes_count(nodes, transfer);
+}
+
+static inline uint8_t pdcp_nodes_count_links(const pdcp_nodes_t *nodes)
+{
+    return pdcp_nodes_count(nodes, PDCP_COUNTS_LINK);
+}
 
 #endif

@@ -9,6 +9,7 @@
 #define PDCP_REQUEST_H
 
 #include <stdbool.h>
+#include <stddef.h>
 #include <stdint.h>
 
 #include "pdcp_codec.h"
@@ -20,6 +21,7 @@ typedef enum {
     PDCP_CLIENT_SETUP,
     PDCP_CLIENT_LINK,
     PDCP_CLIENT_HOST,
+    PDCP_CLIENT_RAW, /* the host, with a frame that is sent as it is */
     PDCP_CLIENT_RESET,
     PDCP_CLIENT_BIND /* is the device with this identity still there? */
 } pdcp_client_t;
@@ -47,7 +49,7 @@ typedef enum {
 
 /* Belongs to one device's place in the table. */
 typedef struct {
-    const uint8_t *bytes; /* value to be set by bulk, or data of a raw request; NULL: it is in value */
+    const uint8_t *bytes; /* value to be set, or data of a raw request; NULL: there is none */
     uint16_t size;        /* of the whole value: to be set, or as 8C says; 08: the time in ms; raw: the DLC */
     uint16_t max_size;    /* longest value that may be got */
     uint16_t offset;      /* bytes transferred so far */
@@ -73,26 +75,37 @@ typedef struct {
     uint8_t channel;
     uint16_t offset;      /* of bytes in the value; values of up to 4 bytes come in one piece */
     uint16_t len;         /* bytes that came now, 0 to 6; raw: the whole data of the answer, 1 to 8 */
-    const uint8_t *bytes; /* valid during the call only */
+    const uint8_t *bytes; /* valid during the call only; never NULL */
 } pdcp_reply_t;
 
 bool pdcp_request_is_idle(const struct pdcp_bus *bus, uint8_t node);
 
-/* Start a request; the device's place must be idle. The value to be set must stay where it is until the reply
- * when len is above 4. max_size: longest value accepted, longer ones fail with PDCP_ERR_BULK. */
-void pdcp_request_get(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t channel,
-                      uint8_t param, uint16_t max_size);
-void pdcp_request_set(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t channel,
-                      uint8_t param, const uint8_t *bytes, uint16_t len);
+/* Starts a request; the device's place must be idle. size: of the value to be set in bytes[], which must stay
+ * where it is until the reply when it is longer than PDCP_VALUE_MAX; of the longest value that may be got,
+ * longer ones fail with PDCP_ERR_BULK; 08: the time in ms, 0 = until released. PDCP_CLIENT_RAW: bytes[] is
+ * the data of the frame, 1 to 8 bytes beginning with code, param and channel, and stays where it is until the
+ * reply; code is below PDCP_ANSWER. */
+void pdcp_request_start(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t code,
+                        uint8_t channel, uint8_t param, const uint8_t *bytes, uint16_t size);
 
-/* Suspend (time_ms: 0 = until released), Release or Reset Device [PDCP 3.2.4, 3.2.5, 3.2.7]. */
-void pdcp_request_command(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t code,
-                          uint16_t time_ms);
+static inline void pdcp_request_get(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t channel,
+                                    uint8_t param, uint16_t max_size)
+{
+    pdcp_request_start(bus, node, client, PDCP_GET_PARAMETER, channel, param, NULL, max_size);
+}
 
-/* Sends data[], 1 to 8 bytes beginning with a function code below PDCP_ANSWER, as it is. data[] must stay
- * where it is until the reply. */
-void pdcp_request_raw(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, const uint8_t *data,
-                      uint8_t dlc);
+static inline void pdcp_request_set(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client, uint8_t channel,
+                                    uint8_t param, const uint8_t *bytes, uint16_t len)
+{
+    pdcp_request_start(bus, node, client, PDCP_SET_PARAMETER, channel, param, bytes, len);
+}
+
+/* Suspend, Release or Reset Device [PDCP 3.2.4, 3.2.5, 3.2.7]. */
+static inline void pdcp_request_command(struct pdcp_bus *bus, uint8_t node, pdcp_client_t client,
+                                        uint8_t code, uint16_t time_ms)
+{
+    pdcp_request_start(bus, node, client, code, 0, 0, NULL, time_ms);
+}
 
 /* Lets the request that is under way be sent no more than this once. */
 void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);

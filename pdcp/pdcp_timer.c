@@ -14,50 +14,42 @@ static bool earlier(const pdcp_timers_t *timers, uint8_t a, uint8_t b)
     return pdcp_time_before(timers->deadline_ms[a], timers->deadline_ms[b]);
 }
 
-static void put(pdcp_timers_t *timers, uint8_t at, uint8_t timer)
+static void put(pdcp_timers_t *timers, uint16_t at, uint8_t timer)
 {
     timers->heap[at] = timer;
-    timers->place[timer] = (uint8_t)(at + 1);
+    timers->place[timer] = (uint8_t)(at + 1u);
 }
 
-static void rise(pdcp_timers_t *timers, uint8_t at, uint8_t timer)
+/* Puts a timer into the heap, whose entry at is to be filled: there, or above or below as its deadline is. */
+static void settle(pdcp_timers_t *timers, uint16_t at, uint8_t timer)
 {
-    while (at > 0) {
-        const uint8_t parent = (uint8_t)((at - 1) / 2);
-        if (!earlier(timers, timer, timers->heap[parent])) {
-            break;
-        }
+    while (at > 0 && earlier(timers, timer, timers->heap[(at - 1u) / 2u])) {
+        const uint16_t parent = (uint16_t)((at - 1u) / 2u);
         put(timers, at, timers->heap[parent]);
         at = parent;
     }
-    put(timers, at, timer);
-}
-
-static void sink(pdcp_timers_t *timers, uint8_t at, uint8_t timer)
-{
     for (;;) {
         uint16_t child = (uint16_t)(2u * at + 1u);
-        if (child >= timers->count) {
-            break;
-        }
         if (child + 1u < timers->count && earlier(timers, timers->heap[child + 1u], timers->heap[child])) {
             child++;
         }
-        if (!earlier(timers, timers->heap[child], timer)) {
+        if (child >= timers->count || !earlier(timers, timers->heap[child], timer)) {
             break;
         }
         put(timers, at, timers->heap[child]);
-        at = (uint8_t)child;
+        at = child;
     }
     put(timers, at, timer);
 }
 
 void pdcp_timers_set(pdcp_timers_t *timers, uint8_t timer, uint32_t deadline_ms)
 {
-    pdcp_timers_cancel(timers, timer);
     timers->deadline_ms[timer] = deadline_ms;
-    timers->count++;
-    rise(timers, (uint8_t)(timers->count - 1), timer);
+    if (timers->place[timer] == 0) {
+        timers->count++;
+        timers->place[timer] = timers->count;
+    }
+    settle(timers, (uint16_t)(timers->place[timer] - 1u), timer);
 }
 
 void pdcp_timers_cancel(pdcp_timers_t *timers, uint8_t timer)
@@ -65,15 +57,12 @@ void pdcp_timers_cancel(pdcp_timers_t *timers, uint8_t timer)
     if (timers->place[timer] == 0) {
         return;
     }
-    const uint8_t at = (uint8_t)(timers->place[timer] - 1);
+    const uint16_t at = (uint16_t)(timers->place[timer] - 1u);
     timers->place[timer] = 0;
     timers->count--;
-    if (at == timers->count) {
-        return;
+    if (at != timers->count) {
+        settle(timers, at, timers->heap[timers->count]);
     }
-    const uint8_t last = timers->heap[timers->count];
-    rise(timers, at, last);
-    sink(timers, (uint8_t)(timers->place[last] - 1), last);
 }
 
 bool pdcp_timers_is_set(const pdcp_timers_t *timers, uint8_t timer)

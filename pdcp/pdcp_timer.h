@@ -20,10 +20,10 @@ enum {
 };
 
 typedef struct {
-    uint32_t deadline_ms[PDCP_TIMERS_MAX];
     uint8_t heap[PDCP_TIMERS_MAX];  /* timer numbers; earliest first */
     uint8_t place[PDCP_TIMERS_MAX]; /* where a timer stands in heap, plus 1; 0: not set */
     uint8_t count;
+    uint32_t deadline_ms[PDCP_TIMERS_MAX];
 } pdcp_timers_t;
 
 void pdcp_timers_init(pdcp_timers_t *timers);

@@ -152,8 +152,9 @@ uint8_t systems_bind(systems_t *s, const systems_device_t *device)
     while (s->nodes.owner[id] != 0) {
         id++;
     }
-    const uint8_t place = pdcp_nodes_add(&s->nodes, &device->identity, id);
+    const uint8_t place = pdcp_nodes_free_place(&s->nodes);
     TEST_ASSERT_NOT_EQUAL(PDCP_NONE, place);
+    pdcp_nodes_add(&s->nodes, place, &device->identity, id);
     if (device->name < SYSTEMS_NAMES) {
         s->named[device->name] = device->identity;
     }

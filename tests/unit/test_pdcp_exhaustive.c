@@ -168,7 +168,7 @@ static void enter_state(pdcp_request_state_t state)
         }
         break;
     case PDCP_REQUEST_RAW:
-        pdcp_request_raw(bus, 0, PDCP_CLIENT_NONE, raw, 3);
+        pdcp_request_start(bus, 0, PDCP_CLIENT_RAW, raw[0], raw[2], raw[1], raw, 3);
         break;
     default:
         break;

@@ -7,7 +7,7 @@
 
 /* Where the source of an input comes from, in this order (D-PRO-9). */
 typedef enum {
-    SOURCE_GIVEN,
+    SOURCE_GIVEN,       /* the phase's output */
     SOURCE_ORIGINAL,    /* the one that the active configuration names */
     SOURCE_REPLACEMENT, /* the most similar to the one that it names, which is missing */
     SOURCE_SIMILAR      /* the most similar to the input itself */
@@ -82,29 +82,28 @@ static uint8_t entry_of(profile_plan_t *plan, uint8_t input)
     return profile_links_of(plan->links, plan->nodes, input);
 }
 
-/* Channel numbers of an entry's ends, PDCP_NONE: missing. */
+/* Channel number of the output that an entry names, PDCP_NONE: missing. */
 static uint8_t output_of(profile_plan_t *plan, uint8_t entry)
 {
     plan->left -= EFFORT_FIND;
     return profile_links_channel(plan->links, plan->nodes, &entry_at(plan, entry)->output, PDCP_OUTPUT);
 }
 
-static uint8_t input_of(profile_plan_t *plan, uint8_t entry)
+/* Notes both ends of the entry that the phase is at. */
+static void look_at_ends(profile_plan_t *plan)
 {
     plan->left -= EFFORT_FIND;
-    return profile_links_channel(plan->links, plan->nodes, &entry_at(plan, entry)->input, PDCP_INPUT);
+    plan->input =
+        profile_links_channel(plan->links, plan->nodes, &entry_at(plan, plan->at)->input, PDCP_INPUT);
+    plan->output = output_of(plan, plan->at);
 }
 
 /* Is this input linked to the output that an entry names? */
 static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t entry)
 {
     const uint8_t output = plan->want[input];
-    if (output == PDCP_NONE) {
-        return false;
-    }
-    const profile_ref_t *end = &entry_at(plan, entry)->output;
-    const pdcp_channel_t *channel = channel_of(plan, output);
-    return channel->index == end->index && profile_links_owns(plan->links, end, plan->nodes, channel->node);
+    return output != PDCP_NONE &&
+           profile_links_name(plan->links, plan->nodes, &entry_at(plan, entry)->output, output);
 }
 
 /* --- Links of the plan --- */
@@ -120,29 +119,23 @@ static uint8_t sole_input(const profile_plan_t *plan, uint8_t output, uint8_t ot
     return PDCP_NONE;
 }
 
-static void link_input(profile_plan_t *plan, uint8_t input, uint8_t output)
+/* Gives an input another source, PDCP_NONE: none. The input PDCP_NONE stands for none. */
+static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
 {
+    if (input == PDCP_NONE) {
+        return;
+    }
+    const uint8_t old = plan->want[input];
     plan->want[input] = output;
-    if (profile_is_sole(channel_of(plan, input))) {
-        profile_set_bit(plan->taken, output, true);
+    if (!profile_is_sole(channel_of(plan, input))) {
+        return;
     }
-}
-
-static void unlink_input(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t output = plan->want[input];
-    plan->want[input] = PDCP_NONE;
-    if (output != PDCP_NONE && profile_is_sole(channel_of(plan, input))) {
+    if (old != PDCP_NONE) {
         plan->left -= EFFORT_SCAN;
-        profile_set_bit(plan->taken, output, sole_input(plan, output, input) != PDCP_NONE);
+        profile_set_bit(plan->taken, old, sole_input(plan, old, input) != PDCP_NONE);
     }
-}
-
-/* What was taken away comes back. */
-static void give_back(profile_plan_t *plan, uint8_t input, uint8_t output)
-{
-    if (input != PDCP_NONE && output != PDCP_NONE) {
-        link_input(plan, input, output);
+    if (output != PDCP_NONE) {
+        profile_set_bit(plan->taken, output, true);
     }
 }
 
@@ -157,31 +150,16 @@ static bool is_banned(const profile_plan_t *plan, uint8_t output, uint8_t input)
     return false;
 }
 
-/* May this output feed this input? Both are set up and unbanned, of different devices, and sole access is
- * respected [PROFILE listing 4.4]. */
+/* May this output feed this input? They are unbanned, of different devices, and sole access is respected
+ * [PROFILE listing 4.4]. Both are set up. */
 static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
 {
-    return is_ready(plan, output, PDCP_OUTPUT) && is_ready(plan, input, PDCP_INPUT) &&
-           channel_of(plan, output)->node != channel_of(plan, input)->node &&
+    return channel_of(plan, output)->node != channel_of(plan, input)->node &&
            !is_banned(plan, output, input) &&
            !(profile_bit(plan->taken, output) && profile_is_sole(channel_of(plan, input)));
 }
 
-/* --- Candidates --- */
-
-/* What candidates are compared with, and at the other end of the link. */
-typedef struct {
-    uint16_t type;
-    uint16_t profile;
-    uint8_t transfer; /* direction of the candidates */
-    uint8_t partner;
-} model_t;
-
-static uint8_t score_of(const profile_plan_t *plan, uint8_t channel, uint16_t type, uint16_t profile)
-{
-    return profile_similarity(channel_of(plan, channel)->type, channel_of(plan, channel)->profile, type,
-                              profile);
-}
+/* --- Searches --- */
 
 /* May this input take the place of a missing one? It must be nobody's. */
 static bool is_spare(profile_plan_t *plan, uint8_t input)
@@ -193,104 +171,108 @@ static bool is_spare(profile_plan_t *plan, uint8_t input)
     return entry == PDCP_NONE || (!plan->waits && output_of(plan, entry) == PDCP_NONE);
 }
 
-/* May a channel be linked to the partner at the other end? */
-static bool is_candidate(profile_plan_t *plan, const model_t *model, uint8_t channel)
+/* May a channel be linked to the partner, or is it terminal if there is none? */
+static bool is_candidate(profile_plan_t *plan, uint8_t partner, uint8_t channel)
 {
-    if (model->transfer == PDCP_OUTPUT) {
-        return may_link(plan, channel, model->partner);
+    if (partner != PDCP_NONE && channel_of(plan, partner)->transfer == PDCP_INPUT) {
+        return is_ready(plan, channel, PDCP_OUTPUT) && may_link(plan, channel, partner);
     }
-    return may_link(plan, model->partner, channel) && is_spare(plan, channel);
+    if (!is_ready(plan, channel, PDCP_INPUT)) {
+        return false;
+    }
+    if (partner == PDCP_NONE) {
+        return profile_is_terminal(channel_of(plan, channel));
+    }
+    return may_link(plan, partner, channel) && is_spare(plan, channel);
 }
 
+/* Channels are searched in the order of their likeness to an end, terminal ones (NULL) in that in which they
+ * are served: the highest score first. */
+static uint16_t score_of(const profile_plan_t *plan, const profile_ref_t *like, uint8_t channel)
+{
+    const pdcp_channel_t *entry = channel_of(plan, channel);
+    return like != NULL ? profile_similarity(entry->type, entry->profile, like->type, like->profile)
+                        : (uint16_t)~profile_priority(entry);
+}
+
+static bool comes_before(const profile_plan_t *plan, const profile_ref_t *like, uint8_t a, uint8_t b)
+{
+    const uint16_t first = score_of(plan, like, a);
+    const uint16_t second = score_of(plan, like, b);
+    return first != second ? first > second : profile_is_before(plan->nodes, a, b);
+}
+
+/* Notes the channel if it is the best one so far. */
+static void compare(profile_plan_t *plan, const profile_ref_t *like, uint8_t channel)
+{
+    if (plan->best != PDCP_NONE ? comes_before(plan, like, channel, plan->best)
+                                : like == NULL || score_of(plan, like, channel) >= PROFILE_CANDIDATE_MIN) {
+        plan->best = channel;
+    }
+}
+
+/* The steps of the searches that follow. */
 static void begin_search(profile_plan_t *plan)
 {
     plan->search_left = (uint16_t)((PROFILE_PLAN_STEPS - plan->steps) / PROFILE_PLAN_SHARE);
-    plan->search_at = 0;
 }
 
-/* Is a channel with this score the best one so far? */
-static void compare(profile_plan_t *plan, uint8_t channel, uint8_t score)
-{
-    if (score > plan->best_score ||
-        (score == plan->best_score &&
-         (plan->best == PDCP_NONE || profile_is_before(plan->nodes, channel, plan->best)))) {
-        plan->best = channel;
-        plan->best_score = score;
-    }
-}
-
-/* A search goes on at search_at, where it begins if that is 0. It looks at one channel at least, however
- * short the slice. */
-static void go_on_searching(profile_plan_t *plan)
+/* Of the channels that may be linked to the partner, the one that comes next behind `tried` in their likeness
+ * to an end; without a partner (PDCP_NONE, NULL) the next terminal one. tried: PDCP_NONE for the first one.
+ * PDCP_NONE: there are no more. The search goes on at search_at, where it begins if that is 0. It looks at
+ * one channel at least, however short the slice. */
+static uint8_t search(profile_plan_t *plan, uint8_t partner, const profile_ref_t *like, uint8_t tried)
 {
     if (plan->search_at == 0) {
         plan->best = PDCP_NONE;
-        plan->best_score = PROFILE_CANDIDATE_MIN;
-    }
-}
-
-/* Goes to the next channel. False: there are no more, or the slice is over. */
-static bool next_channel(profile_plan_t *plan)
-{
-    plan->left--;
-    plan->search_at++;
-    return plan->search_at < PDCP_CHANNELS_MAX && plan->left > 0;
-}
-
-static uint8_t found(profile_plan_t *plan)
-{
-    if (plan->search_at < PDCP_CHANNELS_MAX) {
-        return NOT_YET;
-    }
-    plan->search_at = 0;
-    return plan->best;
-}
-
-/* The channel that comes next behind `tried` in the order of likeness to the model, among those that may be
- * linked to the partner. PDCP_NONE: there are no more. */
-static uint8_t next_candidate(profile_plan_t *plan, const model_t *model, uint8_t tried)
-{
-    const uint8_t tried_score =
-        tried != PDCP_NONE ? score_of(plan, tried, model->type, model->profile) : UINT8_MAX;
-    go_on_searching(plan);
-    if (plan->search_at == 0) {
-        if (plan->search_left < PDCP_CHANNELS_MAX) {
-            return PDCP_NONE;
+        if (partner != PDCP_NONE) {
+            if (plan->search_left < PDCP_CHANNELS_MAX) {
+                return PDCP_NONE;
+            }
+            plan->search_left = (uint16_t)(plan->search_left - PDCP_CHANNELS_MAX);
+            plan->steps += PDCP_CHANNELS_MAX;
         }
-        plan->search_left = (uint16_t)(plan->search_left - PDCP_CHANNELS_MAX);
-        plan->steps += PDCP_CHANNELS_MAX;
     }
     do {
         const uint8_t c = plan->search_at;
-        if (is_candidate(plan, model, c)) {
-            const uint8_t score = score_of(plan, c, model->type, model->profile);
+        if (is_candidate(plan, partner, c)) {
             plan->left -= 4;
-            if (score < tried_score || (score == tried_score && profile_is_before(plan->nodes, tried, c))) {
-                compare(plan, c, score);
+            if (tried == PDCP_NONE || comes_before(plan, like, tried, c)) {
+                compare(plan, like, c);
             }
         }
-    } while (next_channel(plan));
-    return found(plan);
+        plan->left--;
+        plan->search_at++;
+        if (plan->search_at == PDCP_CHANNELS_MAX) {
+            plan->search_at = 0;
+            return plan->best;
+        }
+    } while (plan->left > 0);
+    return NOT_YET;
 }
 
 /* The next candidate of the kind of source that a frame is at. */
 static uint8_t next_of_source(profile_plan_t *plan, const profile_frame_t *frame, uint8_t entry)
 {
-    const pdcp_channel_t *input = channel_of(plan, frame->input);
-    model_t model = {input->type, input->profile, PDCP_OUTPUT, frame->input};
-    if (frame->source != SOURCE_SIMILAR) {
-        const uint8_t original = entry != PDCP_NONE ? output_of(plan, entry) : PDCP_NONE;
-        if (frame->source != SOURCE_REPLACEMENT) {
-            const uint8_t output = frame->source == SOURCE_GIVEN ? plan->given : original;
-            return frame->tried == PDCP_NONE && may_link(plan, output, frame->input) ? output : PDCP_NONE;
-        }
-        if (entry == PDCP_NONE || original != PDCP_NONE) {
+    const uint8_t input = frame->input;
+    if (frame->source == SOURCE_SIMILAR) {
+        const profile_ref_t like = {.type = channel_of(plan, input)->type,
+                                    .profile = channel_of(plan, input)->profile};
+        return search(plan, input, &like, frame->tried);
+    }
+    uint8_t output = plan->output;
+    if (frame->source != SOURCE_GIVEN) {
+        if (entry == PDCP_NONE) {
             return PDCP_NONE;
         }
-        model.type = entry_at(plan, entry)->output.type;
-        model.profile = entry_at(plan, entry)->output.profile;
+        output = output_of(plan, entry);
+        if (frame->source == SOURCE_REPLACEMENT) {
+            return output == PDCP_NONE ? search(plan, input, &entry_at(plan, entry)->output, frame->tried)
+                                       : PDCP_NONE;
+        }
     }
-    return next_candidate(plan, &model, frame->tried);
+    return frame->tried == PDCP_NONE && output != PDCP_NONE && may_link(plan, output, input) ? output
+                                                                                             : PDCP_NONE;
 }
 
 /* The next output to try for the input of the top frame; PDCP_NONE: none is left. */
@@ -320,7 +302,6 @@ static uint8_t next_source(profile_plan_t *plan)
 /* An input is to be connected, on top of the others; the stack of frames replaces recursion. */
 static void push(profile_plan_t *plan, uint8_t input, source_t first)
 {
-    plan->search_at = 0;
     plan->top.input = input;
     plan->top.source = (uint8_t)first;
     plan->top.tried = PDCP_NONE;
@@ -367,7 +348,7 @@ static bool ascend(profile_plan_t *plan)
 static void undo_to(profile_plan_t *plan, uint8_t mark)
 {
     while (plan->logged > mark) {
-        unlink_input(plan, plan->log[--plan->logged]);
+        set_source(plan, plan->log[--plan->logged], PDCP_NONE);
     }
 }
 
@@ -403,7 +384,6 @@ static uint8_t next_need(profile_plan_t *plan, profile_frame_t *frame, need_t en
 static void reject(profile_plan_t *plan)
 {
     undo_to(plan, plan->top.mark);
-    plan->search_at = 0;
     plan->top.choosing = true;
 }
 
@@ -420,7 +400,7 @@ static void choose(profile_plan_t *plan)
         top->choosing = false;
         top->need = NEED_BY_OUTPUT;
         top->cursor = PDCP_NONE;
-        link_input(plan, top->input, output);
+        set_source(plan, top->input, output);
         plan->log[plan->logged++] = top->input;
     }
 }
@@ -445,13 +425,12 @@ static void advance(profile_plan_t *plan)
 
 /* Connects an input and all that its link requires, and of what it desires as much as can be. Loops end: an
  * input that is being connected counts as connected. If it cannot be, nothing has changed when the phase goes
- * on. given: for SOURCE_GIVEN. */
-static void connect(profile_plan_t *plan, uint8_t input, uint8_t given, source_t source)
+ * on. */
+static void connect(profile_plan_t *plan, uint8_t input, source_t source)
 {
     plan->connecting = true;
     plan->depth = 0;
     plan->logged = 0;
-    plan->given = given;
     plan->needs_last = SOURCE_SIMILAR;
     begin_search(plan);
     push(plan, input, source);
@@ -527,7 +506,6 @@ static void go_on(profile_plan_t *plan, phase_t done)
     plan->pass = 0;
     plan->changed = false;
     plan->input = PDCP_NONE;
-    plan->search_at = 0;
 }
 
 /* --- Originals [PROFILE listing 4.3], D-PRO-6 --- */
@@ -559,14 +537,13 @@ static void forget_stand_ins(profile_plan_t *plan)
     plan->left -= EFFORT_SCAN;
 }
 
-/* Is this entry's turn in this pass, terminal ones last, and is there something to bring back? */
-static bool is_due(profile_plan_t *plan, uint8_t number)
+/* Is it the entry's turn in this pass, terminal ones last, and is there something to bring back? */
+static bool is_due(profile_plan_t *plan)
 {
-    plan->input = input_of(plan, number);
-    plan->output = output_of(plan, number);
+    look_at_ends(plan);
     return plan->input != PDCP_NONE && plan->output != PDCP_NONE &&
            profile_is_terminal(channel_of(plan, plan->input)) == (plan->pass == 1) &&
-           (plan->want[plan->input] != plan->output || plan->stand_in[number] != PDCP_NONE);
+           (plan->want[plan->input] != plan->output || plan->stand_in[plan->at] != PDCP_NONE);
 }
 
 static void next_original(profile_plan_t *plan)
@@ -584,7 +561,7 @@ static void bring_back(profile_plan_t *plan)
         go_on(plan, PHASE_ORIGINAL);
         return;
     }
-    if (!is_due(plan, plan->at)) {
+    if (!is_due(plan)) {
         next_original(plan);
         return;
     }
@@ -602,22 +579,15 @@ static void bring_back(profile_plan_t *plan)
     }
 }
 
-static void take_away(profile_plan_t *plan, uint8_t input)
-{
-    if (input != PDCP_NONE) {
-        unlink_input(plan, input);
-    }
-}
-
 /* What a terminal one needs is searched for; another one must find it connected, or in other originals. */
 static void take_for_original(profile_plan_t *plan)
 {
     memcpy(plan->of.bits.lacking, plan->of.bits.gone, sizeof plan->of.bits.lacking);
     plan->source = plan->want[plan->input];
-    take_away(plan, plan->input);
-    take_away(plan, plan->stand_in[plan->at]);
-    take_away(plan, plan->rival);
-    connect(plan, plan->input, plan->output, SOURCE_GIVEN);
+    set_source(plan, plan->input, PDCP_NONE);
+    set_source(plan, plan->stand_in[plan->at], PDCP_NONE);
+    set_source(plan, plan->rival, PDCP_NONE);
+    connect(plan, plan->input, SOURCE_GIVEN);
     if (!profile_is_terminal(channel_of(plan, plan->input))) {
         plan->needs_last = SOURCE_ORIGINAL;
     }
@@ -633,9 +603,9 @@ static void keep_original(profile_plan_t *plan)
 static void give_up_original(profile_plan_t *plan)
 {
     undo_to(plan, 0);
-    give_back(plan, plan->rival, plan->output);
-    give_back(plan, plan->stand_in[plan->at], plan->output);
-    give_back(plan, plan->input, plan->source);
+    set_source(plan, plan->rival, plan->output);
+    set_source(plan, plan->stand_in[plan->at], plan->output);
+    set_source(plan, plan->input, plan->source);
     next_original(plan);
 }
 
@@ -645,7 +615,7 @@ static void link_original(profile_plan_t *plan)
     const uint8_t input = plan->input;
     if (plan->want[input] == PDCP_NONE && entry_at(plan, plan->at)->by_host &&
         may_link(plan, plan->output, input)) {
-        link_input(plan, input, plan->output);
+        set_source(plan, input, plan->output);
         plan->log[plan->logged++] = input;
     }
     if (plan->want[input] == PDCP_NONE) {
@@ -681,46 +651,45 @@ static void judge_original(profile_plan_t *plan)
 
 /* --- Replacements [PROFILE listing 4.6] --- */
 
-static uint8_t replacement_of(profile_plan_t *plan, uint8_t number, uint8_t tried)
+/* Has the link exactly one end, and nothing that stands in for the other? Notes its ends. */
+static bool is_broken(profile_plan_t *plan)
 {
-    const profile_entry_t *entry = entry_at(plan, number);
-    const uint8_t input = input_of(plan, number);
-    const bool for_output = input != PDCP_NONE;
-    const profile_ref_t *missing = for_output ? &entry->output : &entry->input;
-    const model_t model = {missing->type, missing->profile, for_output ? PDCP_OUTPUT : PDCP_INPUT,
-                           for_output ? input : output_of(plan, number)};
-    return next_candidate(plan, &model, tried);
-}
-
-/* Has this link exactly one end, and nothing that stands in for the other? Notes its ends. */
-static bool is_broken(profile_plan_t *plan, uint8_t number)
-{
-    const profile_entry_t *entry = entry_at(plan, number);
-    plan->input = input_of(plan, number);
-    plan->output = output_of(plan, number);
+    const profile_entry_t *entry = entry_at(plan, plan->at);
+    look_at_ends(plan);
     if (plan->input != PDCP_NONE) {
         return plan->output == PDCP_NONE && plan->want[plan->input] == PDCP_NONE &&
                !profile_is_awaited(plan->scene, &entry->output);
     }
-    return plan->output != PDCP_NONE && plan->stand_in[number] == PDCP_NONE &&
+    return plan->output != PDCP_NONE && plan->stand_in[plan->at] == PDCP_NONE &&
            !profile_is_awaited(plan->scene, &entry->input);
 }
 
 /* How alike the two ends would be with the best replacement, plus 1; 0: there is none. NOT_YET. */
-static uint8_t repair_key(profile_plan_t *plan, uint8_t number)
+static uint8_t repair_key(profile_plan_t *plan)
 {
+    const profile_entry_t *entry = entry_at(plan, plan->at);
     if (plan->search_at == 0) {
         begin_search(plan);
     }
-    const uint8_t best = is_broken(plan, number) ? replacement_of(plan, number, PDCP_NONE) : PDCP_NONE;
+    if (!is_broken(plan)) {
+        return 0;
+    }
+    uint8_t partner = plan->input;
+    const profile_ref_t *missing = &entry->output;
+    if (partner == PDCP_NONE) {
+        partner = plan->output;
+        missing = &entry->input;
+    }
+    const uint8_t best = search(plan, partner, missing, PDCP_NONE);
     if (best == NOT_YET) {
         return NOT_YET;
     }
     if (best == PDCP_NONE) {
         return 0;
     }
-    const pdcp_channel_t *end = channel_of(plan, plan->input != PDCP_NONE ? plan->input : plan->output);
-    return (uint8_t)(score_of(plan, best, end->type, end->profile) + 1u);
+    const pdcp_channel_t *one = channel_of(plan, partner);
+    const pdcp_channel_t *other = channel_of(plan, best);
+    return (uint8_t)(profile_similarity(one->type, one->profile, other->type, other->profile) + 1u);
 }
 
 /* Which links are to be repaired first: those whose repaired ends are most alike. */
@@ -730,7 +699,7 @@ static void sort_repairs(profile_plan_t *plan)
         forget_stand_ins(plan);
     }
     if (plan->at < plan->links->count) {
-        const uint8_t key = repair_key(plan, plan->at);
+        const uint8_t key = repair_key(plan);
         if (key == NOT_YET) {
             return;
         }
@@ -743,35 +712,34 @@ static void sort_repairs(profile_plan_t *plan)
 
 static void repair(profile_plan_t *plan)
 {
-    uint8_t best = PDCP_NONE;
     uint8_t best_key = 0;
     for (uint8_t e = 0; e < plan->links->count; e++) {
         if (plan->of.keys[e] > best_key) {
-            best = e;
             best_key = plan->of.keys[e];
+            plan->at = e;
         }
     }
     plan->left -= EFFORT_FIND;
-    if (best == PDCP_NONE) {
+    if (best_key == 0) {
+        plan->at = 0;
         plan->phase = PHASE_NAME;
         return;
     }
-    plan->of.keys[best] = 0;
-    if (!is_broken(plan, best)) { /* it may have been connected as a need of another */
+    plan->of.keys[plan->at] = 0;
+    if (!is_broken(plan)) { /* it may have been connected as a need of another */
         return;
     }
     if (plan->input != PDCP_NONE) {
-        connect(plan, plan->input, PDCP_NONE, SOURCE_REPLACEMENT);
+        connect(plan, plan->input, SOURCE_REPLACEMENT);
         return;
     }
     begin_search(plan);
-    plan->entry = best;
     plan->phase = PHASE_REPAIR_INPUT; /* input is PDCP_NONE: none was tried yet */
 }
 
 static void try_input(profile_plan_t *plan)
 {
-    const uint8_t input = replacement_of(plan, plan->entry, plan->input);
+    const uint8_t input = search(plan, plan->output, &entry_at(plan, plan->at)->input, plan->input);
     if (input == NOT_YET) {
         return;
     }
@@ -779,7 +747,7 @@ static void try_input(profile_plan_t *plan)
     if (input != PDCP_NONE) {
         plan->input = input;
         plan->phase = PHASE_REPAIR_LINK;
-        connect(plan, input, plan->output, SOURCE_GIVEN);
+        connect(plan, input, SOURCE_GIVEN);
     }
 }
 
@@ -787,20 +755,19 @@ static void end_try(profile_plan_t *plan)
 {
     plan->phase = PHASE_REPAIR_INPUT;
     if (plan->want[plan->input] != PDCP_NONE) {
-        plan->stand_in[plan->entry] = plan->input;
+        plan->stand_in[plan->at] = plan->input;
         plan->phase = PHASE_REPAIR_CHOOSE;
     }
 }
 
-/* The input, nobody's, that an output feeds and that is most like a missing one; PDCP_NONE: there is none. */
-static uint8_t fed_instead(profile_plan_t *plan, uint8_t output, const profile_ref_t *missing)
+/* The input, nobody's, that the output feeds and that is most like the missing one; PDCP_NONE: there is none.
+ */
+static uint8_t fed_instead(profile_plan_t *plan)
 {
     plan->best = PDCP_NONE;
-    plan->best_score = PROFILE_CANDIDATE_MIN;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (plan->want[i] == output && !stands_in(plan, i) && entry_of(plan, i) == PDCP_NONE) {
-            const uint8_t score = score_of(plan, i, missing->type, missing->profile);
-            compare(plan, i, score);
+        if (plan->want[i] == plan->output && !stands_in(plan, i) && entry_of(plan, i) == PDCP_NONE) {
+            compare(plan, &entry_at(plan, plan->at)->input, i);
         }
     }
     plan->left -= EFFORT_SCAN;
@@ -811,12 +778,12 @@ static uint8_t fed_instead(profile_plan_t *plan, uint8_t output, const profile_r
  * and goes when the original comes back. */
 static void name_stand_in(profile_plan_t *plan)
 {
-    const uint8_t e = plan->at;
-    if (e < plan->links->count && plan->stand_in[e] == PDCP_NONE && input_of(plan, e) == PDCP_NONE) {
-        const uint8_t output = output_of(plan, e);
-        if (output != PDCP_NONE) {
-            plan->stand_in[e] = fed_instead(plan, output, &entry_at(plan, e)->input);
-            plan->named = plan->named || plan->stand_in[e] != PDCP_NONE;
+    uint8_t *stand_in = &plan->stand_in[plan->at];
+    if (plan->at < plan->links->count && *stand_in == PDCP_NONE) {
+        look_at_ends(plan);
+        if (plan->input == PDCP_NONE && plan->output != PDCP_NONE) {
+            *stand_in = fed_instead(plan);
+            plan->named = plan->named || *stand_in != PDCP_NONE;
         }
     }
     if (was_last(plan, plan->links->count)) {
@@ -826,33 +793,9 @@ static void name_stand_in(profile_plan_t *plan)
 
 /* --- Autoconfiguration [PROFILE listing 4.7] --- */
 
-static bool is_served_before(const profile_plan_t *plan, uint8_t a, uint8_t b)
-{
-    const uint16_t first = profile_priority(channel_of(plan, a));
-    const uint16_t second = profile_priority(channel_of(plan, b));
-    return first != second ? first < second : profile_is_before(plan->nodes, a, b);
-}
-
-/* The terminal channel that is served next behind the last one; PDCP_NONE: there are no more. */
-static uint8_t next_terminal(profile_plan_t *plan, uint8_t last)
-{
-    go_on_searching(plan);
-    do {
-        const uint8_t i = plan->search_at;
-        if (is_ready(plan, i, PDCP_INPUT) && profile_is_terminal(channel_of(plan, i))) {
-            plan->left -= 4;
-            if ((last == PDCP_NONE || is_served_before(plan, last, i)) &&
-                (plan->best == PDCP_NONE || is_served_before(plan, i, plan->best))) {
-                plan->best = i;
-            }
-        }
-    } while (next_channel(plan));
-    return found(plan);
-}
-
 static void autoconfigure(profile_plan_t *plan)
 {
-    const uint8_t input = next_terminal(plan, plan->input);
+    const uint8_t input = search(plan, PDCP_NONE, NULL, plan->input);
     if (input == NOT_YET) {
         return;
     }
@@ -860,7 +803,7 @@ static void autoconfigure(profile_plan_t *plan)
     if (input == PDCP_NONE) {
         go_on(plan, PHASE_AUTO);
     } else if (plan->want[input] == PDCP_NONE && !(plan->waits && entry_of(plan, input) != PDCP_NONE)) {
-        connect(plan, input, PDCP_NONE, SOURCE_SIMILAR);
+        connect(plan, input, SOURCE_SIMILAR);
     }
 }
 
@@ -897,7 +840,7 @@ static void look(profile_plan_t *plan)
 {
     const uint8_t output = working(plan->scene, plan->at);
     plan->base = hash(plan->base, output);
-    give_back(plan, plan->at, output);
+    set_source(plan, plan->at, output);
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
         plan->phase = PHASE_AWAITED;
     }
@@ -929,7 +872,7 @@ static void begin_round(profile_plan_t *plan)
 static void settle(profile_plan_t *plan)
 {
     if (is_lacking(plan, plan->at)) {
-        unlink_input(plan, plan->at);
+        set_source(plan, plan->at, PDCP_NONE);
         plan->changed = true;
     }
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
@@ -953,7 +896,7 @@ static void end_round(profile_plan_t *plan)
 /* An input gives up its source, in the configuration too when the plan is done: it is marked as gone. */
 static void drop(profile_plan_t *plan, uint8_t input)
 {
-    unlink_input(plan, input);
+    set_source(plan, input, PDCP_NONE);
     profile_set_bit(plan->of.bits.gone, input, true);
 }
 
@@ -997,23 +940,63 @@ static void finish(profile_plan_t *plan)
     plan->phase = PHASE_DONE;
 }
 
-static void (*const phases[])(profile_plan_t *) = {[PHASE_LOOK] = look,
-                                                   [PHASE_AWAITED] = find_awaited,
-                                                   [PHASE_ROUND] = begin_round,
-                                                   [PHASE_ORIGINAL] = bring_back,
-                                                   [PHASE_REPAIR] = sort_repairs,
-                                                   [PHASE_SETTLE] = settle,
-                                                   [PHASE_AUTO] = autoconfigure,
-                                                   [PHASE_ROUND_END] = end_round,
-                                                   [PHASE_ORIGINAL_TAKE] = take_for_original,
-                                                   [PHASE_ORIGINAL_LINK] = link_original,
-                                                   [PHASE_ORIGINAL_JUDGE] = judge_original,
-                                                   [PHASE_REPAIR_CHOOSE] = repair,
-                                                   [PHASE_REPAIR_INPUT] = try_input,
-                                                   [PHASE_REPAIR_LINK] = end_try,
-                                                   [PHASE_NAME] = name_stand_in,
-                                                   [PHASE_ENFORCE] = enforce,
-                                                   [PHASE_FINISH] = finish};
+/* A unit of the phase that the plan is at. */
+static void do_phase(profile_plan_t *plan)
+{
+    switch (plan->phase) {
+    case PHASE_LOOK:
+        look(plan);
+        break;
+    case PHASE_AWAITED:
+        find_awaited(plan);
+        break;
+    case PHASE_ROUND:
+        begin_round(plan);
+        break;
+    case PHASE_ORIGINAL:
+        bring_back(plan);
+        break;
+    case PHASE_REPAIR:
+        sort_repairs(plan);
+        break;
+    case PHASE_SETTLE:
+        settle(plan);
+        break;
+    case PHASE_AUTO:
+        autoconfigure(plan);
+        break;
+    case PHASE_ROUND_END:
+        end_round(plan);
+        break;
+    case PHASE_ORIGINAL_TAKE:
+        take_for_original(plan);
+        break;
+    case PHASE_ORIGINAL_LINK:
+        link_original(plan);
+        break;
+    case PHASE_ORIGINAL_JUDGE:
+        judge_original(plan);
+        break;
+    case PHASE_REPAIR_CHOOSE:
+        repair(plan);
+        break;
+    case PHASE_REPAIR_INPUT:
+        try_input(plan);
+        break;
+    case PHASE_REPAIR_LINK:
+        end_try(plan);
+        break;
+    case PHASE_NAME:
+        name_stand_in(plan);
+        break;
+    case PHASE_ENFORCE:
+        enforce(plan);
+        break;
+    default:
+        finish(plan);
+        break;
+    }
+}
 
 static bool is_set_up(const profile_scene_t *scene, uint8_t place)
 {
@@ -1048,7 +1031,7 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
         } else if (plan->finding) {
             find_next(plan);
         } else {
-            phases[plan->phase](plan);
+            do_phase(plan);
         }
     }
     return plan->phase == PHASE_DONE;

@@ -91,7 +91,6 @@ typedef struct {
     uint8_t at;       /* entry or input that the phase is at */
     uint8_t pass;     /* over the originals */
     uint8_t input_at; /* that find_next is at */
-    uint8_t entry;    /* that is being repaired */
     uint8_t input;    /* the phase's, and its output */
     uint8_t output;
     uint8_t source;     /* what an original replaces: the source that its input had, */
@@ -102,13 +101,11 @@ typedef struct {
     bool changed;       /* by this pass over the inputs */
     bool finding;       /* links that lack something are being marked, and count as gone */
     bool connecting;    /* an input is being connected: */
-    uint8_t given;      /* the source of SOURCE_GIVEN, */
-    uint8_t needs_last; /* and the last kind of source that may be asked for what its link needs */
+    uint8_t needs_last; /* the last kind of source that may be asked for what its link needs */
     uint8_t depth;      /* frames below the top */
     uint8_t logged;
     uint8_t search_at; /* channel that a search is at, 0: it begins */
     uint8_t best;      /* the best one so far */
-    uint8_t best_score;
     profile_frame_t top;
     uint8_t ready[PROFILE_PLACE_BYTES];   /* bit per place: the device was set up when the plan was begun */
     uint8_t taken[PROFILE_CHANNEL_BYTES]; /* bit per output: it feeds a sole-access input */

@@ -39,6 +39,13 @@ typedef struct {
     bool terminal;     /* inputs */
 } profile_type_t;
 
+/* The fields of a type word that channels are compared by, and the flags. */
+#define PROFILE_TYPE_SIZE 0xC000u
+#define PROFILE_TYPE_DATA 0x3000u
+#define PROFILE_TYPE_CONTROL 0x0C00u
+#define PROFILE_TYPE_SOLE 0x0200u
+#define PROFILE_TYPE_TERMINAL 0x0100u
+
 /* Takes a type word apart. False: a float that has not 16 bits (D-PRO-2); type is filled all the same. Unused
  * bits are ignored. */
 bool profile_type_decode(uint16_t word, profile_type_t *type);

@@ -42,9 +42,9 @@ typedef struct {
 } profile_entry_t;
 
 typedef struct {
+    uint8_t count;
     profile_part_t parts[PROFILE_PARTS_MAX]; /* in use: those that an entry names */
     profile_entry_t entries[PROFILE_LINKS_MAX];
-    uint8_t count;
 } profile_links_t;
 
 void profile_links_init(profile_links_t *links);

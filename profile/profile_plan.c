@@ -20,8 +20,8 @@ typedef enum { NEED_BY_OUTPUT, NEED_BY_INPUT, DESIRED_BY_OUTPUT, DESIRED_BY_INPU
 typedef enum {
     PHASE_LOOK,     /* which links work */
     PHASE_AWAITED,  /* which ends are awaited */
-    PHASE_ROUND,    /* a round begins */
-    PHASE_ORIGINAL, /* from here on in the order of a round */
+    PHASE_ROUND,    /* a round consists of these: */
+    PHASE_ORIGINAL,
     PHASE_REPAIR,
     PHASE_SETTLE,
     PHASE_AUTO,
@@ -108,11 +108,14 @@ static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t e
 
 /* --- Links of the plan --- */
 
-/* The sole-access input, other than this one, that an output feeds; PDCP_NONE: none. */
-static uint8_t sole_input(const profile_plan_t *plan, uint8_t output, uint8_t other_than)
+/* Another input that wants the output for itself and has it, if this one wants it for itself; PDCP_NONE: there is none. */
+static uint8_t rival_of(const profile_plan_t *plan, uint8_t input, uint8_t output)
 {
+    if (output == PDCP_NONE || !profile_is_sole(channel_of(plan, input))) {
+        return PDCP_NONE;
+    }
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (plan->want[i] == output && i != other_than && profile_is_sole(channel_of(plan, i))) {
+        if (plan->want[i] == output && i != input && profile_is_sole(channel_of(plan, i))) {
             return i;
         }
     }
@@ -132,7 +135,7 @@ static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
     }
     if (old != PDCP_NONE) {
         plan->left -= EFFORT_SCAN;
-        profile_set_bit(plan->taken, old, sole_input(plan, old, input) != PDCP_NONE);
+        profile_set_bit(plan->taken, old, rival_of(plan, input, old) != PDCP_NONE);
     }
     if (output != PDCP_NONE) {
         profile_set_bit(plan->taken, output, true);
@@ -357,27 +360,24 @@ static bool is_connected(const profile_plan_t *plan, uint8_t input)
     return plan->want[input] != PDCP_NONE && !(plan->finding && profile_bit(plan->of.bits.gone, input));
 }
 
-/* The next unconnected input that the link of a frame requires or desires, required ones first; PDCP_NONE:
- * there are no more. */
-static uint8_t next_need(profile_plan_t *plan, profile_frame_t *frame, need_t end)
+/* The next unconnected input, behind the last one (PDCP_NONE: the first one), that a channel requires or
+ * desires; PDCP_NONE: there are no more. */
+static uint8_t next_need(profile_plan_t *plan, uint8_t by, bool desired, uint8_t last)
 {
-    for (; frame->need < end; frame->need++, frame->cursor = PDCP_NONE) {
-        const uint8_t by = frame->need % 2 == NEED_BY_OUTPUT ? frame->tried : frame->input;
-        const pdcp_node_t *owner = &plan->nodes->nodes[channel_of(plan, by)->node];
-        if (owner->needs_stride == 0) {
-            continue;
-        }
-        uint8_t c = frame->cursor != PDCP_NONE ? channel_of(plan, frame->cursor)->next : owner->first_channel;
-        for (; c != PDCP_NONE; c = channel_of(plan, c)->next) {
-            plan->left--;
-            if (!is_connected(plan, c) && pdcp_nodes_needs(plan->nodes, by, frame->need >= DESIRED_BY_OUTPUT,
-                                                           channel_of(plan, c)->index)) {
-                frame->cursor = c;
-                return c;
-            }
-        }
+    const pdcp_node_t *owner = &plan->nodes->nodes[channel_of(plan, by)->node];
+    if (owner->needs_stride == 0) {
+        return PDCP_NONE;
     }
-    return PDCP_NONE;
+    uint8_t c = last != PDCP_NONE ? channel_of(plan, last)->next : owner->first_channel;
+    while (c != PDCP_NONE) {
+        const pdcp_channel_t *channel = channel_of(plan, c);
+        plan->left--;
+        if (!is_connected(plan, c) && pdcp_nodes_needs(plan->nodes, by, desired, channel->index)) {
+            break;
+        }
+        c = channel->next;
+    }
+    return c;
 }
 
 /* The link of the top frame does not hold: all that was made for it is undone, its next candidate is due. */
@@ -385,6 +385,13 @@ static void reject(profile_plan_t *plan)
 {
     undo_to(plan, plan->top.mark);
     plan->top.choosing = true;
+}
+
+/* A link that can be undone. */
+static void link_input(profile_plan_t *plan, uint8_t input, uint8_t output)
+{
+    set_source(plan, input, output);
+    plan->log[plan->logged++] = input;
 }
 
 /* Gives the input of the top frame its next candidate. */
@@ -400,12 +407,11 @@ static void choose(profile_plan_t *plan)
         top->choosing = false;
         top->need = NEED_BY_OUTPUT;
         top->cursor = PDCP_NONE;
-        set_source(plan, top->input, output);
-        plan->log[plan->logged++] = top->input;
+        link_input(plan, top->input, output);
     }
 }
 
-/* Goes on with the top frame. */
+/* Goes on with the top frame: to the next need of its link, required ones first. */
 static void advance(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
@@ -413,11 +419,15 @@ static void advance(profile_plan_t *plan)
         choose(plan);
         return;
     }
-    const uint8_t need = next_need(plan, top, NEEDS_END);
-    if (need == PDCP_NONE) {
-        (void)ascend(plan); /* the link holds */
+    top->cursor = next_need(plan, top->need % 2 == NEED_BY_OUTPUT ? top->tried : top->input,
+                            top->need >= DESIRED_BY_OUTPUT, top->cursor);
+    if (top->cursor == PDCP_NONE) {
+        top->need++;
+        if (top->need == NEEDS_END) {
+            (void)ascend(plan); /* the link holds */
+        }
     } else if (plan->depth < PROFILE_PLAN_DEPTH - 1) {
-        descend(plan, need);
+        descend(plan, top->cursor);
     } else if (top->need < DESIRED_BY_OUTPUT) {
         reject(plan); /* too deep */
     }
@@ -447,8 +457,9 @@ static bool is_left_alone(profile_plan_t *plan, uint8_t input)
 /* Does the link of this input lack something that it requires, which takes it away? */
 static bool is_lacking(profile_plan_t *plan, uint8_t input)
 {
-    profile_frame_t frame = {.input = input, .tried = plan->want[input], .cursor = PDCP_NONE};
-    return is_connected(plan, input) && next_need(plan, &frame, DESIRED_BY_OUTPUT) != PDCP_NONE &&
+    return is_connected(plan, input) &&
+           (next_need(plan, plan->want[input], false, PDCP_NONE) != PDCP_NONE ||
+            next_need(plan, input, false, PDCP_NONE) != PDCP_NONE) &&
            !is_left_alone(plan, input);
 }
 
@@ -463,14 +474,26 @@ static bool was_last(profile_plan_t *plan, uint8_t count)
     return true;
 }
 
+static bool was_last_entry(profile_plan_t *plan)
+{
+    return was_last(plan, plan->links->count);
+}
+
 /* Begins to mark as gone the links that lack something they require, and those that require one of these. The
  * phase then goes on. */
 static void find_gone(profile_plan_t *plan)
 {
     memset(plan->of.bits.gone, 0, sizeof plan->of.bits.gone);
     plan->finding = true;
+    plan->spoilt = false;
     plan->changed = false;
     plan->input_at = 0;
+}
+
+static bool is_original(profile_plan_t *plan, uint8_t input)
+{
+    const uint8_t own = entry_of(plan, input);
+    return own != PDCP_NONE && hears_output_of(plan, input, own);
 }
 
 /* One input more, until nothing changes. */
@@ -480,6 +503,9 @@ static void find_next(profile_plan_t *plan)
     if (is_lacking(plan, input)) {
         profile_set_bit(plan->of.bits.gone, input, true);
         plan->changed = true;
+        if (input == plan->input || (!profile_bit(plan->of.bits.lacking, input) && is_original(plan, input))) {
+            plan->spoilt = true;
+        }
     }
     plan->input_at++;
     if (plan->input_at == PDCP_CHANNELS_MAX) {
@@ -549,7 +575,7 @@ static bool is_due(profile_plan_t *plan)
 static void next_original(profile_plan_t *plan)
 {
     plan->phase = PHASE_ORIGINAL;
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         plan->pass++;
     }
 }
@@ -567,12 +593,12 @@ static void bring_back(profile_plan_t *plan)
     }
     forget_stand_ins(plan);
     const uint8_t stand_in = plan->stand_in[plan->at];
-    const uint8_t other = profile_is_sole(channel_of(plan, plan->input))
-                              ? sole_input(plan, plan->output, plan->input)
-                              : PDCP_NONE;
-    const bool takes = other != PDCP_NONE && other != stand_in && is_standing_in(plan, other);
-    plan->rival = takes ? other : PDCP_NONE;
-    plan->costs = takes || plan->want[plan->input] != PDCP_NONE || stand_in != PDCP_NONE;
+    plan->rival = rival_of(plan, plan->input, plan->output);
+    if (plan->rival == stand_in || (plan->rival != PDCP_NONE && !is_standing_in(plan, plan->rival))) {
+        plan->rival = PDCP_NONE;
+    }
+    plan->costs =
+        plan->rival != PDCP_NONE || plan->want[plan->input] != PDCP_NONE || stand_in != PDCP_NONE;
     plan->phase = PHASE_ORIGINAL_TAKE;
     if (plan->costs) {
         find_gone(plan);
@@ -615,8 +641,7 @@ static void link_original(profile_plan_t *plan)
     const uint8_t input = plan->input;
     if (plan->want[input] == PDCP_NONE && entry_at(plan, plan->at)->by_host &&
         may_link(plan, plan->output, input)) {
-        set_source(plan, input, plan->output);
-        plan->log[plan->logged++] = input;
+        link_input(plan, input, plan->output);
     }
     if (plan->want[input] == PDCP_NONE) {
         give_up_original(plan);
@@ -628,24 +653,13 @@ static void link_original(profile_plan_t *plan)
     }
 }
 
-static bool is_original(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t own = entry_of(plan, input);
-    return own != PDCP_NONE && hears_output_of(plan, input, own);
-}
-
 /* Has the link all that it requires, and has no original lost that which it had? */
 static void judge_original(profile_plan_t *plan)
 {
-    bool good = !profile_bit(plan->of.bits.gone, plan->input);
-    for (uint8_t i = 0; good && i < PDCP_CHANNELS_MAX; i++) {
-        good = !profile_bit(plan->of.bits.gone, i) || profile_bit(plan->of.bits.lacking, i) ||
-               !is_original(plan, i);
-    }
-    if (good) {
-        keep_original(plan);
-    } else {
+    if (plan->spoilt) {
         give_up_original(plan);
+    } else {
+        keep_original(plan);
     }
 }
 
@@ -705,7 +719,7 @@ static void sort_repairs(profile_plan_t *plan)
         }
         plan->of.keys[plan->at] = key;
     }
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         plan->phase = PHASE_REPAIR_CHOOSE;
     }
 }
@@ -783,10 +797,12 @@ static void name_stand_in(profile_plan_t *plan)
         look_at_ends(plan);
         if (plan->input == PDCP_NONE && plan->output != PDCP_NONE) {
             *stand_in = fed_instead(plan);
-            plan->named = plan->named || *stand_in != PDCP_NONE;
+            if (*stand_in != PDCP_NONE) {
+                plan->named = true;
+            }
         }
     }
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         go_on(plan, PHASE_REPAIR);
     }
 }
@@ -838,10 +854,10 @@ static uint8_t working(const profile_scene_t *scene, uint8_t input)
 
 static void look(profile_plan_t *plan)
 {
-    const uint8_t output = working(plan->scene, plan->at);
-    plan->base = hash(plan->base, output);
-    set_source(plan, plan->at, output);
+    set_source(plan, plan->at, working(plan->scene, plan->at));
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        plan->base = hash_want(plan);
+        plan->before = plan->base;
         plan->phase = PHASE_AWAITED;
     }
 }
@@ -851,20 +867,19 @@ static void find_awaited(profile_plan_t *plan)
     const profile_entry_t *entry = entry_at(plan, plan->at);
     if (plan->at < plan->links->count) {
         plan->left -= 2 * EFFORT_FIND;
-        plan->waits = plan->waits || profile_is_awaited(plan->scene, &entry->output) ||
-                      profile_is_awaited(plan->scene, &entry->input);
+        if (profile_is_awaited(plan->scene, &entry->output) ||
+            profile_is_awaited(plan->scene, &entry->input)) {
+            plan->waits = true;
+        }
     }
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         forget_stand_ins(plan);
-        plan->phase = (plan->what & PROFILE_PLAN_ENFORCE) != 0 ? PHASE_ENFORCE : PHASE_ROUND;
+        if ((plan->what & PROFILE_PLAN_ENFORCE) != 0) {
+            plan->phase = PHASE_ENFORCE;
+        } else {
+            go_on(plan, PHASE_ROUND);
+        }
     }
-}
-
-static void begin_round(profile_plan_t *plan)
-{
-    plan->named = false;
-    plan->before = hash_want(plan);
-    go_on(plan, PHASE_ROUND);
 }
 
 /* Takes away, until nothing changes, links that require an input which is not connected (D-PRO-9). A loop in
@@ -886,33 +901,30 @@ static void settle(profile_plan_t *plan)
 /* What a plan takes away may make room for what it has passed over: it goes round until nothing changes. */
 static void end_round(profile_plan_t *plan)
 {
+    const uint32_t now = hash_want(plan);
+    const bool settled = now == plan->before && !plan->named;
+    plan->before = now;
+    plan->named = false;
     plan->rounds--;
-    plan->phase = PHASE_FINISH;
-    if (plan->rounds != 0 && (plan->named || plan->before != hash_want(plan))) {
-        plan->phase = PHASE_ROUND;
+    if (plan->rounds == 0 || settled) {
+        plan->phase = PHASE_FINISH;
+    } else {
+        go_on(plan, PHASE_ROUND);
     }
 }
 
-/* An input gives up its source, in the configuration too when the plan is done: it is marked as gone. */
-static void drop(profile_plan_t *plan, uint8_t input)
-{
-    set_source(plan, input, PDCP_NONE);
-    profile_set_bit(plan->of.bits.gone, input, true);
-}
-
-/* Of the sole-access inputs of one output the first one keeps it. */
+/* Of the sole-access inputs of one output the first one keeps it. The others are marked as gone: when the
+ * plan is done they give it up in the configuration, too. */
 static void enforce(profile_plan_t *plan)
 {
-    const uint8_t i = plan->at;
-    const uint8_t output = plan->want[i];
-    for (uint8_t k = 0; output != PDCP_NONE && k < PDCP_CHANNELS_MAX && profile_is_sole(channel_of(plan, i));
-         k++) {
-        if (plan->want[k] == output && k != i && profile_is_sole(channel_of(plan, k))) {
-            drop(plan, profile_is_before(plan->nodes, k, i) ? i : k);
-        }
-    }
+    const uint8_t rival = rival_of(plan, plan->at, plan->want[plan->at]);
     plan->left -= EFFORT_SCAN;
-    if (was_last(plan, PDCP_CHANNELS_MAX)) {
+    if (rival != PDCP_NONE) {
+        const uint8_t last = profile_is_before(plan->nodes, rival, plan->at) ? plan->at : rival;
+        set_source(plan, last, PDCP_NONE);
+        profile_set_bit(plan->of.bits.gone, last, true);
+    } else if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        plan->rounds = 1;
         go_on(plan, PHASE_REPAIR);
     }
 }
@@ -949,9 +961,6 @@ static void do_phase(profile_plan_t *plan)
         break;
     case PHASE_AWAITED:
         find_awaited(plan);
-        break;
-    case PHASE_ROUND:
-        begin_round(plan);
         break;
     case PHASE_ORIGINAL:
         bring_back(plan);
@@ -998,9 +1007,15 @@ static void do_phase(profile_plan_t *plan)
     }
 }
 
-static bool is_set_up(const profile_scene_t *scene, uint8_t place)
+/* Which devices are set up: a bit per place. */
+static void note_ready(const profile_scene_t *scene, uint8_t ready[PROFILE_PLACE_BYTES])
 {
-    return scene->nodes->nodes[place].state == PDCP_NODE_READY;
+    memset(ready, 0, PROFILE_PLACE_BYTES);
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (scene->nodes->nodes[i].state == PDCP_NODE_READY) {
+            profile_set_bit(ready, i, true);
+        }
+    }
 }
 
 void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint8_t what)
@@ -1008,11 +1023,8 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
     memset(plan, 0, sizeof *plan);
     memset(plan->want, PDCP_NONE, sizeof plan->want);
     plan->what = what | ALWAYS;
-    plan->rounds = what == PROFILE_PLAN_ENFORCE ? 1 : ROUNDS_MAX;
-    plan->base = HASH_START;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        profile_set_bit(plan->ready, i, is_set_up(scene, i));
-    }
+    plan->rounds = ROUNDS_MAX;
+    note_ready(scene, plan->ready);
     for (uint8_t e = 0; e < scene->links->count; e++) {
         plan->stand_in[e] = scene->links->entries[e].stand_in;
     }
@@ -1039,11 +1051,9 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
 
 bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene)
 {
-    bool stale = false;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        stale = stale || profile_bit(plan->ready, i) != is_set_up(scene, i);
-    }
-    return stale;
+    uint8_t ready[PROFILE_PLACE_BYTES];
+    note_ready(scene, ready);
+    return memcmp(ready, plan->ready, sizeof ready) != 0;
 }
 
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)

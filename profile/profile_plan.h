@@ -99,6 +99,7 @@ typedef struct {
     bool named;         /* this round has found stand-ins */
     bool waits;         /* an end of the configuration is awaited */
     bool changed;       /* by this pass over the inputs */
+    bool spoilt;        /* the original at hand lacks something, or another one lost what it has */
     bool finding;       /* links that lack something are being marked, and count as gone */
     bool connecting;    /* an input is being connected: */
     uint8_t needs_last; /* the last kind of source that may be asked for what its link needs */

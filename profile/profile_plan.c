@@ -21,6 +21,7 @@ typedef enum {
     PHASE_LOOK,     /* which links work */
     PHASE_AWAITED,  /* which ends are awaited */
     PHASE_ROUND,    /* a round consists of these: */
+    PHASE_ENFORCE,
     PHASE_ORIGINAL,
     PHASE_REPAIR,
     PHASE_SETTLE,
@@ -33,7 +34,6 @@ typedef enum {
     PHASE_REPAIR_INPUT,   /* an input stands in, */
     PHASE_REPAIR_LINK,    /* and is linked */
     PHASE_NAME,
-    PHASE_ENFORCE,
     PHASE_FINISH,
     PHASE_DONE
 } phase_t;
@@ -312,13 +312,19 @@ static void push(profile_plan_t *plan, uint8_t input, source_t first)
     plan->top.choosing = true;
 }
 
+/* Where the bits of a frame stand in its byte. */
+static unsigned below_shift(const profile_plan_t *plan)
+{
+    return plan->depth % 2u * 4u;
+}
+
 /* Of a frame below the top, only what cannot be found elsewhere is kept. */
 static void descend(profile_plan_t *plan, uint8_t need)
 {
     profile_frame_t *top = &plan->top;
-    const uint8_t kept = (uint8_t)(top->source << 2 | top->need);
+    const unsigned shift = below_shift(plan);
     uint8_t *below = &plan->below[plan->depth / 2];
-    *below = (uint8_t)(plan->depth % 2 == 0 ? kept : (*below & 0xFu) | (unsigned)kept << 4);
+    *below = (uint8_t)((*below & ~(0xFu << shift)) | (unsigned)(top->source << 2 | top->need) << shift);
     plan->depth++;
     profile_set_bit(plan->open, top->mark, true);
     push(plan, need, SOURCE_ORIGINAL);
@@ -333,8 +339,7 @@ static bool ascend(profile_plan_t *plan)
         return false;
     }
     plan->depth--;
-    const uint8_t both = plan->below[plan->depth / 2];
-    const uint8_t kept = plan->depth % 2 == 0 ? both & 0xFu : both >> 4;
+    const unsigned kept = (unsigned)plan->below[plan->depth / 2] >> below_shift(plan);
     do {
         top->mark--;
     } while (!profile_bit(plan->open, top->mark));
@@ -342,7 +347,7 @@ static bool ascend(profile_plan_t *plan)
     top->cursor = top->input;
     top->input = plan->log[top->mark];
     top->tried = plan->want[top->input];
-    top->source = (uint8_t)(kept >> 2);
+    top->source = (uint8_t)(kept >> 2 & 3u);
     top->need = kept & 3u;
     top->choosing = false;
     return true;
@@ -518,7 +523,8 @@ static void find_next(profile_plan_t *plan)
 /* Goes to the part of a round that comes behind this one, of those that are to be planned. */
 static void go_on(profile_plan_t *plan, phase_t done)
 {
-    static const uint8_t whats[] = {[PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
+    static const uint8_t whats[] = {[PHASE_ENFORCE] = PROFILE_PLAN_ENFORCE,
+                                    [PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
                                     [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,
                                     [PHASE_SETTLE] = ALWAYS,
                                     [PHASE_AUTO] = PROFILE_PLAN_AUTO,
@@ -563,15 +569,6 @@ static void forget_stand_ins(profile_plan_t *plan)
     plan->left -= EFFORT_SCAN;
 }
 
-/* Is it the entry's turn in this pass, terminal ones last, and is there something to bring back? */
-static bool is_due(profile_plan_t *plan)
-{
-    look_at_ends(plan);
-    return plan->input != PDCP_NONE && plan->output != PDCP_NONE &&
-           profile_is_terminal(channel_of(plan, plan->input)) == (plan->pass == 1) &&
-           (plan->want[plan->input] != plan->output || plan->stand_in[plan->at] != PDCP_NONE);
-}
-
 static void next_original(profile_plan_t *plan)
 {
     plan->phase = PHASE_ORIGINAL;
@@ -580,14 +577,18 @@ static void next_original(profile_plan_t *plan)
     }
 }
 
-/* Makes a link of the configuration whose ends are both there; what stood in for them goes. */
+/* Makes a link of the configuration whose ends are both there, in the second pass a terminal one, if there is
+ * something to bring back; what stood in for them goes. */
 static void bring_back(profile_plan_t *plan)
 {
     if (plan->pass == 2 || plan->links->count == 0) {
         go_on(plan, PHASE_ORIGINAL);
         return;
     }
-    if (!is_due(plan)) {
+    look_at_ends(plan);
+    if (plan->input == PDCP_NONE || plan->output == PDCP_NONE ||
+        profile_is_terminal(channel_of(plan, plan->input)) != plan->pass ||
+        (plan->want[plan->input] == plan->output && plan->stand_in[plan->at] == PDCP_NONE)) {
         next_original(plan);
         return;
     }
@@ -874,11 +875,7 @@ static void find_awaited(profile_plan_t *plan)
     }
     if (was_last_entry(plan)) {
         forget_stand_ins(plan);
-        if ((plan->what & PROFILE_PLAN_ENFORCE) != 0) {
-            plan->phase = PHASE_ENFORCE;
-        } else {
-            go_on(plan, PHASE_ROUND);
-        }
+        go_on(plan, PHASE_ROUND);
     }
 }
 
@@ -902,13 +899,12 @@ static void settle(profile_plan_t *plan)
 static void end_round(profile_plan_t *plan)
 {
     const uint32_t now = hash_want(plan);
-    const bool settled = now == plan->before && !plan->named;
-    plan->before = now;
-    plan->named = false;
     plan->rounds--;
-    if (plan->rounds == 0 || settled) {
+    if (plan->rounds == 0 || (now == plan->before && !plan->named)) {
         plan->phase = PHASE_FINISH;
     } else {
+        plan->before = now;
+        plan->named = false;
         go_on(plan, PHASE_ROUND);
     }
 }
@@ -924,8 +920,7 @@ static void enforce(profile_plan_t *plan)
         set_source(plan, last, PDCP_NONE);
         profile_set_bit(plan->of.bits.gone, last, true);
     } else if (was_last(plan, PDCP_CHANNELS_MAX)) {
-        plan->rounds = 1;
-        go_on(plan, PHASE_REPAIR);
+        go_on(plan, PHASE_ENFORCE);
     }
 }
 

@@ -69,8 +69,10 @@ bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
         return false;
     }
     const pdcp_node_t *node = &scene->nodes->nodes[place];
-    const bool coming = node->state == PDCP_NODE_SETUP && !node->setup_again;
-    return coming || (node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place));
+    if (node->state == PDCP_NODE_SETUP) {
+        return !node->setup_again;
+    }
+    return node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place);
 }
 
 /* --- Ends of the configuration --- */
@@ -135,7 +137,9 @@ static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
     }
     if (old != PDCP_NONE) {
         plan->left -= EFFORT_SCAN;
-        profile_set_bit(plan->taken, old, rival_of(plan, input, old) != PDCP_NONE);
+        if (rival_of(plan, input, old) == PDCP_NONE) {
+            profile_set_bit(plan->taken, old, false);
+        }
     }
     if (output != PDCP_NONE) {
         profile_set_bit(plan->taken, output, true);
@@ -208,10 +212,14 @@ static bool comes_before(const profile_plan_t *plan, const profile_ref_t *like, 
 /* Notes the channel if it is the best one so far. */
 static void compare(profile_plan_t *plan, const profile_ref_t *like, uint8_t channel)
 {
-    if (plan->best != PDCP_NONE ? comes_before(plan, like, channel, plan->best)
-                                : like == NULL || score_of(plan, like, channel) >= PROFILE_CANDIDATE_MIN) {
-        plan->best = channel;
+    if (plan->best != PDCP_NONE) {
+        if (!comes_before(plan, like, channel, plan->best)) {
+            return;
+        }
+    } else if (like != NULL && score_of(plan, like, channel) < PROFILE_CANDIDATE_MIN) {
+        return;
     }
+    plan->best = channel;
 }
 
 /* The steps of the searches that follow. */
@@ -254,48 +262,33 @@ static uint8_t search(profile_plan_t *plan, uint8_t partner, const profile_ref_t
     return NOT_YET;
 }
 
-/* The next candidate of the kind of source that a frame is at. */
-static uint8_t next_of_source(profile_plan_t *plan, const profile_frame_t *frame, uint8_t entry)
+/* The next candidate of the kind of source that the top frame is at; PDCP_NONE: there are no more. */
+static uint8_t next_source(profile_plan_t *plan)
 {
-    const uint8_t input = frame->input;
-    if (frame->source == SOURCE_SIMILAR) {
-        const profile_ref_t like = {.type = channel_of(plan, input)->type,
-                                    .profile = channel_of(plan, input)->profile};
-        return search(plan, input, &like, frame->tried);
+    const profile_frame_t *top = &plan->top;
+    const uint8_t entry = entry_of(plan, top->input);
+    if (entry != PDCP_NONE && profile_is_awaited(plan->scene, &entry_at(plan, entry)->output)) {
+        return PDCP_NONE; /* its source will be back in a moment */
+    }
+    if (top->source == SOURCE_SIMILAR) {
+        const profile_ref_t like = {.type = channel_of(plan, top->input)->type,
+                                    .profile = channel_of(plan, top->input)->profile};
+        return search(plan, top->input, &like, top->tried);
     }
     uint8_t output = plan->output;
-    if (frame->source != SOURCE_GIVEN) {
+    if (top->source != SOURCE_GIVEN) {
         if (entry == PDCP_NONE) {
             return PDCP_NONE;
         }
         output = output_of(plan, entry);
-        if (frame->source == SOURCE_REPLACEMENT) {
-            return output == PDCP_NONE ? search(plan, input, &entry_at(plan, entry)->output, frame->tried)
-                                       : PDCP_NONE;
-        }
     }
-    return frame->tried == PDCP_NONE && output != PDCP_NONE && may_link(plan, output, input) ? output
-                                                                                             : PDCP_NONE;
-}
-
-/* The next output to try for the input of the top frame; PDCP_NONE: none is left. */
-static uint8_t next_source(profile_plan_t *plan)
-{
-    profile_frame_t *frame = &plan->top;
-    const uint8_t last = plan->depth == 0 ? frame->source : plan->needs_last;
-    const uint8_t entry = entry_of(plan, frame->input);
-    if (entry != PDCP_NONE && profile_is_awaited(plan->scene, &entry_at(plan, entry)->output)) {
-        return PDCP_NONE; /* its source will be back in a moment */
+    if (top->source == SOURCE_REPLACEMENT) {
+        return output != PDCP_NONE
+                   ? PDCP_NONE
+                   : search(plan, top->input, &entry_at(plan, entry)->output, top->tried);
     }
-    for (; frame->source <= last; frame->source++) {
-        const uint8_t output = next_of_source(plan, frame, entry);
-        if (output == NOT_YET) {
-            return NOT_YET;
-        }
-        frame->tried = output;
-        if (output != PDCP_NONE) {
-            return output;
-        }
+    if (top->tried == PDCP_NONE && output != PDCP_NONE && may_link(plan, output, top->input)) {
+        return output;
     }
     return PDCP_NONE;
 }
@@ -404,15 +397,19 @@ static void choose(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
     const uint8_t output = next_source(plan);
-    if (output == PDCP_NONE) {
-        if (ascend(plan) && top->need < DESIRED_BY_OUTPUT) {
-            reject(plan);
-        }
-    } else if (output != NOT_YET) {
+    if (output == NOT_YET) {
+        return;
+    }
+    top->tried = output;
+    if (output != PDCP_NONE) {
         top->choosing = false;
         top->need = NEED_BY_OUTPUT;
         top->cursor = PDCP_NONE;
         link_input(plan, top->input, output);
+    } else if (plan->depth != 0 && top->source < plan->needs_last) {
+        top->source++;
+    } else if (ascend(plan) && top->need < DESIRED_BY_OUTPUT) {
+        reject(plan);
     }
 }
 
@@ -453,19 +450,25 @@ static void connect(profile_plan_t *plan, uint8_t input, source_t source)
 
 /* --- What links require --- */
 
-static bool is_left_alone(profile_plan_t *plan, uint8_t input)
+/* The entry of an input that hears the output which it names; PDCP_NONE: it has none, or hears another one. */
+static uint8_t original_of(profile_plan_t *plan, uint8_t input)
 {
     const uint8_t entry = entry_of(plan, input);
-    return entry != PDCP_NONE && entry_at(plan, entry)->by_host && hears_output_of(plan, input, entry);
+    return entry != PDCP_NONE && hears_output_of(plan, input, entry) ? entry : PDCP_NONE;
 }
 
 /* Does the link of this input lack something that it requires, which takes it away? */
 static bool is_lacking(profile_plan_t *plan, uint8_t input)
 {
-    return is_connected(plan, input) &&
-           (next_need(plan, plan->want[input], false, PDCP_NONE) != PDCP_NONE ||
-            next_need(plan, input, false, PDCP_NONE) != PDCP_NONE) &&
-           !is_left_alone(plan, input);
+    if (!is_connected(plan, input)) {
+        return false;
+    }
+    if (next_need(plan, plan->want[input], false, PDCP_NONE) == PDCP_NONE &&
+        next_need(plan, input, false, PDCP_NONE) == PDCP_NONE) {
+        return false;
+    }
+    const uint8_t original = original_of(plan, input);
+    return original == PDCP_NONE || !entry_at(plan, original)->by_host;
 }
 
 /* Goes to the next entry or input of a phase. True: it was the last one, from the first one again. */
@@ -495,12 +498,6 @@ static void find_gone(profile_plan_t *plan)
     plan->input_at = 0;
 }
 
-static bool is_original(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t own = entry_of(plan, input);
-    return own != PDCP_NONE && hears_output_of(plan, input, own);
-}
-
 /* One input more, until nothing changes. */
 static void find_next(profile_plan_t *plan)
 {
@@ -508,7 +505,7 @@ static void find_next(profile_plan_t *plan)
     if (is_lacking(plan, input)) {
         profile_set_bit(plan->of.bits.gone, input, true);
         plan->changed = true;
-        if (input == plan->input || (!profile_bit(plan->of.bits.lacking, input) && is_original(plan, input))) {
+        if (input == plan->input || (!profile_bit(plan->of.bits.lacking, input) && original_of(plan, input) != PDCP_NONE)) {
             plan->spoilt = true;
         }
     }
@@ -1062,10 +1059,13 @@ bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t
 
 bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
 {
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && profile_is_sole(&nodes->channels[input]); i++) {
+    if (!profile_is_sole(&nodes->channels[input])) {
+        return false;
+    }
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *other = &nodes->channels[i];
-        if (i != input && profile_is_ready(nodes, i, PDCP_INPUT) && other->link == PDCP_LINK_ACTIVE &&
-            other->feed == output && profile_is_sole(other)) {
+        if (other->feed == output && other->link == PDCP_LINK_ACTIVE && i != input &&
+            profile_is_sole(other) && profile_is_ready(nodes, i, PDCP_INPUT)) {
             return true;
         }
     }

@@ -146,23 +146,17 @@ static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
     }
 }
 
-static bool is_banned(const profile_plan_t *plan, uint8_t output, uint8_t input)
+/* May this output feed this input? They are of different devices and unbanned, and sole access is respected
+ * [PROFILE listing 4.4]. Both are set up. */
+static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
 {
     const profile_pair_t *banned = plan->scene->banned;
     for (uint8_t i = plan->scene->banned_count; i > 0; i--, banned++) {
         if (banned->output == output && banned->input == input) {
-            return true;
+            return false;
         }
     }
-    return false;
-}
-
-/* May this output feed this input? They are unbanned, of different devices, and sole access is respected
- * [PROFILE listing 4.4]. Both are set up. */
-static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
-{
     return channel_of(plan, output)->node != channel_of(plan, input)->node &&
-           !is_banned(plan, output, input) &&
            !(profile_bit(plan->taken, output) && profile_is_sole(channel_of(plan, input)));
 }
 
@@ -529,11 +523,9 @@ static void go_on(profile_plan_t *plan, phase_t done)
     uint8_t phase = (uint8_t)done;
     do {
         phase++;
-    } while (phase < (uint8_t)PHASE_ROUND_END && (plan->what & whats[phase]) == 0);
+    } while ((plan->what & whats[phase]) == 0);
     plan->phase = phase;
-    plan->at = 0;
     plan->pass = 0;
-    plan->changed = false;
     plan->input = PDCP_NONE;
 }
 
@@ -569,17 +561,19 @@ static void forget_stand_ins(profile_plan_t *plan)
 static void next_original(profile_plan_t *plan)
 {
     plan->phase = PHASE_ORIGINAL;
-    if (was_last_entry(plan)) {
-        plan->pass++;
-    }
+    plan->at++;
 }
 
 /* Makes a link of the configuration whose ends are both there, in the second pass a terminal one, if there is
  * something to bring back; what stood in for them goes. */
 static void bring_back(profile_plan_t *plan)
 {
-    if (plan->pass == 2 || plan->links->count == 0) {
-        go_on(plan, PHASE_ORIGINAL);
+    if (plan->at >= plan->links->count) {
+        plan->at = 0;
+        plan->pass++;
+        if (plan->pass == 2) {
+            go_on(plan, PHASE_ORIGINAL);
+        }
         return;
     }
     look_at_ends(plan);
@@ -823,23 +817,6 @@ static void autoconfigure(profile_plan_t *plan)
 
 /* --- The whole --- */
 
-#define HASH_START 2166136261uL
-
-static uint32_t hash(uint32_t sum, uint8_t byte) /* FNV-1a */
-{
-    return (sum ^ byte) * 16777619uL;
-}
-
-static uint32_t hash_want(profile_plan_t *plan)
-{
-    uint32_t sum = HASH_START;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        sum = hash(sum, plan->want[i]);
-    }
-    plan->left -= 2 * EFFORT_SCAN;
-    return sum;
-}
-
 /* The output that feeds an input, as the tables are; PDCP_NONE: none does. */
 static uint8_t working(const profile_scene_t *scene, uint8_t input)
 {
@@ -848,6 +825,22 @@ static uint8_t working(const profile_scene_t *scene, uint8_t input)
         channel->link == PDCP_LINK_ACTIVE && profile_is_ready(scene->nodes, input, PDCP_INPUT) &&
         profile_is_ready(scene->nodes, channel->feed, PDCP_OUTPUT) && !profile_bit(scene->made, input);
     return works ? channel->feed : PDCP_NONE;
+}
+
+/* A hash (FNV-1a) of the links of a plan, or of those that work. */
+static uint32_t hash_links(const profile_plan_t *plan, const profile_scene_t *scene)
+{
+    uint32_t sum = 2166136261uL;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        sum = (sum ^ (plan != NULL ? plan->want[i] : working(scene, i))) * 16777619uL;
+    }
+    return sum;
+}
+
+static uint32_t hash_want(profile_plan_t *plan)
+{
+    plan->left -= 2 * EFFORT_SCAN;
+    return hash_links(plan, NULL);
 }
 
 static void look(profile_plan_t *plan)
@@ -896,8 +889,8 @@ static void settle(profile_plan_t *plan)
 static void end_round(profile_plan_t *plan)
 {
     const uint32_t now = hash_want(plan);
-    plan->rounds--;
-    if (plan->rounds == 0 || (now == plan->before && !plan->named)) {
+    plan->rounds++;
+    if (plan->rounds == ROUNDS_MAX || (now == plan->before && !plan->named)) {
         plan->phase = PHASE_FINISH;
     } else {
         plan->before = now;
@@ -1015,7 +1008,6 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
     memset(plan, 0, sizeof *plan);
     memset(plan->want, PDCP_NONE, sizeof plan->want);
     plan->what = what | ALWAYS;
-    plan->rounds = ROUNDS_MAX;
     note_ready(scene, plan->ready);
     for (uint8_t e = 0; e < scene->links->count; e++) {
         plan->stand_in[e] = scene->links->entries[e].stand_in;
@@ -1050,11 +1042,7 @@ bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *sc
 
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)
 {
-    uint32_t sum = HASH_START;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        sum = hash(sum, working(scene, i));
-    }
-    return sum != plan->base;
+    return hash_links(NULL, scene) != plan->base;
 }
 
 bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)

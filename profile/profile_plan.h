@@ -87,7 +87,7 @@ typedef struct {
     uint16_t search_left; /* steps of the search under way */
     uint8_t what;
     uint8_t phase;
-    uint8_t rounds;   /* that are left */
+    uint8_t rounds;   /* that are over */
     uint8_t at;       /* entry or input that the phase is at */
     uint8_t pass;     /* over the originals */
     uint8_t input_at; /* that find_next is at */

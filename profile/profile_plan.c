@@ -538,14 +538,6 @@ static bool stands_in(profile_plan_t *plan, uint8_t input)
     return memchr(plan->stand_in, input, plan->links->count) != NULL;
 }
 
-/* Does the source of this input only stand in: for the one that the configuration names, or the input itself
- * for another? */
-static bool is_standing_in(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t own = entry_of(plan, input);
-    return own != PDCP_NONE ? !hears_output_of(plan, input, own) : stands_in(plan, input);
-}
-
 /* Inputs that do not stand in any more. */
 static void forget_stand_ins(profile_plan_t *plan)
 {
@@ -562,6 +554,21 @@ static void next_original(profile_plan_t *plan)
 {
     plan->phase = PHASE_ORIGINAL;
     plan->at++;
+}
+
+/* The rival of the input, if its source only stands in for the one that the configuration names, or the rival
+ * itself for another input than this one; PDCP_NONE: there is none. */
+static uint8_t rival_to_go(profile_plan_t *plan)
+{
+    const uint8_t rival = rival_of(plan, plan->input, plan->output);
+    if (rival == PDCP_NONE || rival == plan->stand_in[plan->at]) {
+        return PDCP_NONE;
+    }
+    const uint8_t own = entry_of(plan, rival);
+    if (own != PDCP_NONE ? hears_output_of(plan, rival, own) : !stands_in(plan, rival)) {
+        return PDCP_NONE;
+    }
+    return rival;
 }
 
 /* Makes a link of the configuration whose ends are both there, in the second pass a terminal one, if there is
@@ -584,15 +591,12 @@ static void bring_back(profile_plan_t *plan)
         return;
     }
     forget_stand_ins(plan);
-    const uint8_t stand_in = plan->stand_in[plan->at];
-    plan->rival = rival_of(plan, plan->input, plan->output);
-    if (plan->rival == stand_in || (plan->rival != PDCP_NONE && !is_standing_in(plan, plan->rival))) {
-        plan->rival = PDCP_NONE;
-    }
-    plan->costs =
-        plan->rival != PDCP_NONE || plan->want[plan->input] != PDCP_NONE || stand_in != PDCP_NONE;
     plan->phase = PHASE_ORIGINAL_TAKE;
-    if (plan->costs) {
+    plan->rival = rival_to_go(plan);
+    plan->costs = false;
+    if (plan->rival != PDCP_NONE || plan->want[plan->input] != PDCP_NONE ||
+        plan->stand_in[plan->at] != PDCP_NONE) {
+        plan->costs = true;
         find_gone(plan);
     }
 }
@@ -657,35 +661,35 @@ static void judge_original(profile_plan_t *plan)
 
 /* --- Replacements [PROFILE listing 4.6] --- */
 
-/* Has the link exactly one end, and nothing that stands in for the other? Notes its ends. */
-static bool is_broken(profile_plan_t *plan)
+/* The missing end of a link that has exactly one, and nothing that stands in for the other; NULL: it is not
+ * broken. Notes its ends. */
+static const profile_ref_t *broken_end(profile_plan_t *plan)
 {
     const profile_entry_t *entry = entry_at(plan, plan->at);
+    const profile_ref_t *missing = &entry->output;
     look_at_ends(plan);
-    if (plan->input != PDCP_NONE) {
-        return plan->output == PDCP_NONE && plan->want[plan->input] == PDCP_NONE &&
-               !profile_is_awaited(plan->scene, &entry->output);
+    if (plan->input == PDCP_NONE) {
+        missing = &entry->input;
+        if (plan->output == PDCP_NONE || plan->stand_in[plan->at] != PDCP_NONE) {
+            return NULL;
+        }
+    } else if (plan->output != PDCP_NONE || plan->want[plan->input] != PDCP_NONE) {
+        return NULL;
     }
-    return plan->output != PDCP_NONE && plan->stand_in[plan->at] == PDCP_NONE &&
-           !profile_is_awaited(plan->scene, &entry->input);
+    return profile_is_awaited(plan->scene, missing) ? NULL : missing;
 }
 
 /* How alike the two ends would be with the best replacement, plus 1; 0: there is none. NOT_YET. */
 static uint8_t repair_key(profile_plan_t *plan)
 {
-    const profile_entry_t *entry = entry_at(plan, plan->at);
     if (plan->search_at == 0) {
         begin_search(plan);
     }
-    if (!is_broken(plan)) {
+    const profile_ref_t *missing = broken_end(plan);
+    if (missing == NULL) {
         return 0;
     }
-    uint8_t partner = plan->input;
-    const profile_ref_t *missing = &entry->output;
-    if (partner == PDCP_NONE) {
-        partner = plan->output;
-        missing = &entry->input;
-    }
+    const uint8_t partner = plan->input != PDCP_NONE ? plan->input : plan->output;
     const uint8_t best = search(plan, partner, missing, PDCP_NONE);
     if (best == NOT_YET) {
         return NOT_YET;
@@ -732,7 +736,7 @@ static void repair(profile_plan_t *plan)
         return;
     }
     plan->of.keys[plan->at] = 0;
-    if (!is_broken(plan)) { /* it may have been connected as a need of another */
+    if (broken_end(plan) == NULL) { /* it may have been connected as a need of another */
         return;
     }
     if (plan->input != PDCP_NONE) {

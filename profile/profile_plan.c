@@ -18,9 +18,9 @@ typedef enum { NEED_BY_OUTPUT, NEED_BY_INPUT, DESIRED_BY_OUTPUT, DESIRED_BY_INPU
 
 /* Where a plan is at. Each phase does one unit of its work at a time. */
 typedef enum {
-    PHASE_LOOK,     /* which links work */
-    PHASE_AWAITED,  /* which ends are awaited */
-    PHASE_ROUND,    /* a round consists of these: */
+    PHASE_LOOK,    /* which links work */
+    PHASE_AWAITED, /* which ends are awaited */
+    PHASE_ROUND,   /* a round consists of these: */
     PHASE_ENFORCE,
     PHASE_ORIGINAL,
     PHASE_REPAIR,
@@ -110,7 +110,8 @@ static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t e
 
 /* --- Links of the plan --- */
 
-/* Another input that wants the output for itself and has it, if this one wants it for itself; PDCP_NONE: there is none. */
+/* Another input that wants the output for itself and has it, if this one wants it for itself; PDCP_NONE:
+ * there is none. */
 static uint8_t rival_of(const profile_plan_t *plan, uint8_t input, uint8_t output)
 {
     if (output == PDCP_NONE || !profile_is_sole(channel_of(plan, input))) {
@@ -277,9 +278,8 @@ static uint8_t next_source(profile_plan_t *plan)
         output = output_of(plan, entry);
     }
     if (top->source == SOURCE_REPLACEMENT) {
-        return output != PDCP_NONE
-                   ? PDCP_NONE
-                   : search(plan, top->input, &entry_at(plan, entry)->output, top->tried);
+        return output != PDCP_NONE ? PDCP_NONE
+                                   : search(plan, top->input, &entry_at(plan, entry)->output, top->tried);
     }
     if (top->tried == PDCP_NONE && output != PDCP_NONE && may_link(plan, output, top->input)) {
         return output;
@@ -444,7 +444,8 @@ static void connect(profile_plan_t *plan, uint8_t input, source_t source)
 
 /* --- What links require --- */
 
-/* The entry of an input that hears the output which it names; PDCP_NONE: it has none, or hears another one. */
+/* The entry of an input that hears the output which it names; PDCP_NONE: it has none, or hears another one.
+ */
 static uint8_t original_of(profile_plan_t *plan, uint8_t input)
 {
     const uint8_t entry = entry_of(plan, input);
@@ -499,7 +500,8 @@ static void find_next(profile_plan_t *plan)
     if (is_lacking(plan, input)) {
         profile_set_bit(plan->of.bits.gone, input, true);
         plan->changed = true;
-        if (input == plan->input || (!profile_bit(plan->of.bits.lacking, input) && original_of(plan, input) != PDCP_NONE)) {
+        if (input == plan->input ||
+            (!profile_bit(plan->of.bits.lacking, input) && original_of(plan, input) != PDCP_NONE)) {
             plan->spoilt = true;
         }
     }
@@ -514,12 +516,10 @@ static void find_next(profile_plan_t *plan)
 /* Goes to the part of a round that comes behind this one, of those that are to be planned. */
 static void go_on(profile_plan_t *plan, phase_t done)
 {
-    static const uint8_t whats[] = {[PHASE_ENFORCE] = PROFILE_PLAN_ENFORCE,
-                                    [PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
-                                    [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,
-                                    [PHASE_SETTLE] = ALWAYS,
-                                    [PHASE_AUTO] = PROFILE_PLAN_AUTO,
-                                    [PHASE_ROUND_END] = ALWAYS};
+    static const uint8_t whats[] = {
+        [PHASE_ENFORCE] = PROFILE_PLAN_ENFORCE, [PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
+        [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,  [PHASE_SETTLE] = ALWAYS,
+        [PHASE_AUTO] = PROFILE_PLAN_AUTO,       [PHASE_ROUND_END] = ALWAYS};
     uint8_t phase = (uint8_t)done;
     do {
         phase++;

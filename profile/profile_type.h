@@ -56,7 +56,7 @@ uint16_t profile_type_encode(const profile_type_t *type);
 /* Bytes of one value: 1 for 4 and 8 bits, 2 for 12 and 16. */
 uint8_t profile_type_bytes(const profile_type_t *type);
 
-/* Smallest and largest value. False: float, which has no such range. Boolean: 0 and 1. */
+/* Smallest and largest value. False: float, which has no such range; nothing is written. Boolean: 0 and 1. */
 bool profile_type_range(const profile_type_t *type, int32_t *min, int32_t *max);
 
 /* Writes one value, least significant byte first, unused upper bits 0. value is clamped to the range; a

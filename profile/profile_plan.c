@@ -601,34 +601,25 @@ static void bring_back(profile_plan_t *plan)
     }
 }
 
+/* Gives what an original replaces its sources back, or takes them away (PDCP_NONE). */
+static void set_replaced(profile_plan_t *plan, uint8_t output, uint8_t source)
+{
+    set_source(plan, plan->rival, output);
+    set_source(plan, plan->stand_in[plan->at], output);
+    set_source(plan, plan->input, source);
+}
+
 /* What a terminal one needs is searched for; another one must find it connected, or in other originals. */
 static void take_for_original(profile_plan_t *plan)
 {
     memcpy(plan->of.bits.lacking, plan->of.bits.gone, sizeof plan->of.bits.lacking);
     plan->source = plan->want[plan->input];
-    set_source(plan, plan->input, PDCP_NONE);
-    set_source(plan, plan->stand_in[plan->at], PDCP_NONE);
-    set_source(plan, plan->rival, PDCP_NONE);
+    set_replaced(plan, PDCP_NONE, PDCP_NONE);
     connect(plan, plan->input, SOURCE_GIVEN);
     if (!profile_is_terminal(channel_of(plan, plan->input))) {
         plan->needs_last = SOURCE_ORIGINAL;
     }
     plan->phase = PHASE_ORIGINAL_LINK;
-}
-
-static void keep_original(profile_plan_t *plan)
-{
-    plan->stand_in[plan->at] = PDCP_NONE;
-    next_original(plan);
-}
-
-static void give_up_original(profile_plan_t *plan)
-{
-    undo_to(plan, 0);
-    set_source(plan, plan->rival, plan->output);
-    set_source(plan, plan->stand_in[plan->at], plan->output);
-    set_source(plan, plan->input, plan->source);
-    next_original(plan);
 }
 
 /* What the host has made needs nothing (D-PRO-9). */
@@ -639,24 +630,25 @@ static void link_original(profile_plan_t *plan)
         may_link(plan, plan->output, input)) {
         link_input(plan, input, plan->output);
     }
+    plan->phase = PHASE_ORIGINAL_JUDGE;
+    plan->spoilt = false;
     if (plan->want[input] == PDCP_NONE) {
-        give_up_original(plan);
+        plan->spoilt = true;
     } else if (plan->costs) {
-        plan->phase = PHASE_ORIGINAL_JUDGE;
         find_gone(plan);
-    } else {
-        keep_original(plan);
     }
 }
 
-/* Has the link all that it requires, and has no original lost that which it had? */
+/* Is the original linked with all that it requires, and has no other one lost that which it had? */
 static void judge_original(profile_plan_t *plan)
 {
     if (plan->spoilt) {
-        give_up_original(plan);
+        undo_to(plan, 0);
+        set_replaced(plan, plan->output, plan->source);
     } else {
-        keep_original(plan);
+        plan->stand_in[plan->at] = PDCP_NONE;
     }
+    next_original(plan);
 }
 
 /* --- Replacements [PROFILE listing 4.6] --- */

@@ -78,6 +78,13 @@ bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transf
            nodes->nodes[entry->node].state == PDCP_NODE_READY;
 }
 
+uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input)
+{
+    const pdcp_channel_t *channel = &nodes->channels[input];
+    return channel->link == PDCP_LINK_ACTIVE && profile_is_ready(nodes, input, PDCP_INPUT) ? channel->feed
+                                                                                           : PDCP_NONE;
+}
+
 bool profile_bit(const uint8_t *bits, uint8_t number)
 {
     return (bits[number / 8] & (1u << (number % 8))) != 0;

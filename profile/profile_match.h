@@ -33,6 +33,9 @@ bool profile_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t in
 /* Is this channel on a device that is set up, and has it this direction (PDCP_INPUT, PDCP_OUTPUT)? */
 bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
 
+/* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
+uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input);
+
 /* Sets of channels or places, a bit for each number. */
 bool profile_bit(const uint8_t *bits, uint8_t number);
 void profile_set_bit(uint8_t *bits, uint8_t number, bool value);

@@ -813,14 +813,14 @@ static void autoconfigure(profile_plan_t *plan)
 
 /* --- The whole --- */
 
-/* The output that feeds an input, as the tables are; PDCP_NONE: none does. */
+/* The output that feeds an input, as the tables are; PDCP_NONE: none does, or it does not count. */
 static uint8_t working(const profile_scene_t *scene, uint8_t input)
 {
-    const pdcp_channel_t *channel = &scene->nodes->channels[input];
-    const bool works =
-        channel->link == PDCP_LINK_ACTIVE && profile_is_ready(scene->nodes, input, PDCP_INPUT) &&
-        profile_is_ready(scene->nodes, channel->feed, PDCP_OUTPUT) && !profile_bit(scene->made, input);
-    return works ? channel->feed : PDCP_NONE;
+    const uint8_t feed = profile_feed(scene->nodes, input);
+    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || profile_bit(scene->made, input)) {
+        return PDCP_NONE;
+    }
+    return feed;
 }
 
 /* A hash (FNV-1a) of the links of a plan, or of those that work. */
@@ -1047,9 +1047,7 @@ bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8
         return false;
     }
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *other = &nodes->channels[i];
-        if (other->feed == output && other->link == PDCP_LINK_ACTIVE && i != input &&
-            profile_is_sole(other) && profile_is_ready(nodes, i, PDCP_INPUT)) {
+        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(&nodes->channels[i])) {
             return true;
         }
     }

@@ -557,11 +557,11 @@ static void next_original(profile_plan_t *plan)
 }
 
 /* The rival of the input, if its source only stands in for the one that the configuration names, or the rival
- * itself for another input than this one; PDCP_NONE: there is none. */
+ * itself for another input; PDCP_NONE: there is none. */
 static uint8_t rival_to_go(profile_plan_t *plan)
 {
     const uint8_t rival = rival_of(plan, plan->input, plan->output);
-    if (rival == PDCP_NONE || rival == plan->stand_in[plan->at]) {
+    if (rival == PDCP_NONE) {
         return PDCP_NONE;
     }
     const uint8_t own = entry_of(plan, rival);
@@ -584,18 +584,20 @@ static void bring_back(profile_plan_t *plan)
         return;
     }
     look_at_ends(plan);
-    if (plan->input == PDCP_NONE || plan->output == PDCP_NONE ||
-        profile_is_terminal(channel_of(plan, plan->input)) != plan->pass ||
-        (plan->want[plan->input] == plan->output && plan->stand_in[plan->at] == PDCP_NONE)) {
+    const uint8_t input = plan->input;
+    const uint8_t *stand_in = &plan->stand_in[plan->at];
+    if (input == PDCP_NONE || plan->output == PDCP_NONE ||
+        profile_is_terminal(channel_of(plan, input)) != plan->pass ||
+        (plan->want[input] == plan->output && *stand_in == PDCP_NONE)) {
         next_original(plan);
         return;
     }
     forget_stand_ins(plan);
     plan->phase = PHASE_ORIGINAL_TAKE;
+    plan->source = plan->want[input];
     plan->rival = rival_to_go(plan);
     plan->costs = false;
-    if (plan->rival != PDCP_NONE || plan->want[plan->input] != PDCP_NONE ||
-        plan->stand_in[plan->at] != PDCP_NONE) {
+    if (plan->rival != PDCP_NONE || plan->source != PDCP_NONE || *stand_in != PDCP_NONE) {
         plan->costs = true;
         find_gone(plan);
     }
@@ -613,7 +615,6 @@ static void set_replaced(profile_plan_t *plan, uint8_t output, uint8_t source)
 static void take_for_original(profile_plan_t *plan)
 {
     memcpy(plan->of.bits.lacking, plan->of.bits.gone, sizeof plan->of.bits.lacking);
-    plan->source = plan->want[plan->input];
     set_replaced(plan, PDCP_NONE, PDCP_NONE);
     connect(plan, plan->input, SOURCE_GIVEN);
     if (!profile_is_terminal(channel_of(plan, plan->input))) {

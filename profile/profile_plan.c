@@ -317,13 +317,13 @@ static void descend(profile_plan_t *plan, uint8_t need)
     push(plan, need, SOURCE_ORIGINAL);
 }
 
-/* The top frame is done: back to the one below. False: there is none. */
-static bool ascend(profile_plan_t *plan)
+/* The top frame is done: back to the one below; below the last one the phase goes on. */
+static void ascend(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
     if (plan->depth == 0) {
         plan->connecting = false;
-        return false;
+        return;
     }
     plan->depth--;
     const unsigned kept = (unsigned)plan->below[plan->depth / 2] >> below_shift(plan);
@@ -337,7 +337,6 @@ static bool ascend(profile_plan_t *plan)
     top->source = (uint8_t)(kept >> 2 & 3u);
     top->need = kept & 3u;
     top->choosing = false;
-    return true;
 }
 
 static void undo_to(profile_plan_t *plan, uint8_t mark)
@@ -402,8 +401,11 @@ static void choose(profile_plan_t *plan)
         link_input(plan, top->input, output);
     } else if (plan->depth != 0 && top->source < plan->needs_last) {
         top->source++;
-    } else if (ascend(plan) && top->need < DESIRED_BY_OUTPUT) {
-        reject(plan);
+    } else {
+        ascend(plan);
+        if (top->need < DESIRED_BY_OUTPUT) {
+            reject(plan); /* of the last frame nothing is left to be undone */
+        }
     }
 }
 
@@ -420,7 +422,7 @@ static void advance(profile_plan_t *plan)
     if (top->cursor == PDCP_NONE) {
         top->need++;
         if (top->need == NEEDS_END) {
-            (void)ascend(plan); /* the link holds */
+            ascend(plan); /* the link holds */
         }
     } else if (plan->depth < PROFILE_PLAN_DEPTH - 1) {
         descend(plan, top->cursor);

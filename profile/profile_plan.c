@@ -521,11 +521,12 @@ static void go_on(profile_plan_t *plan, phase_t done)
     static const uint8_t whats[] = {
         [PHASE_ENFORCE] = PROFILE_PLAN_ENFORCE, [PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
         [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,  [PHASE_SETTLE] = ALWAYS,
-        [PHASE_AUTO] = PROFILE_PLAN_AUTO,       [PHASE_ROUND_END] = ALWAYS};
+        [PHASE_AUTO] = PROFILE_PLAN_AUTO,
+    };
     uint8_t phase = (uint8_t)done;
     do {
         phase++;
-    } while ((plan->what & whats[phase]) == 0);
+    } while (phase != (uint8_t)PHASE_ROUND_END && (plan->what & whats[phase]) == 0);
     plan->phase = phase;
     plan->pass = 0;
     plan->input = PDCP_NONE;

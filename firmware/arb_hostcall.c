@@ -1,60 +1,32 @@
 #include "arb_hostcall.h"
 
-#include <stddef.h>
-
 #include "pdcp_time.h"
-
-const arb_message_t *arb_call_find(const arb_message_t *messages, uint8_t count, uint16_t id)
-{
-    for (uint8_t i = 0; i < count; i++) {
-        if (messages[i].id == id) {
-            return &messages[i];
-        }
-    }
-    return NULL;
-}
 
 uint8_t arb_call_started(arb_call_t *call)
 {
-    call->turn->started = true;
-    call->turn->waiting = false;
+    call->api->turn.started = true;
     call->api->handed = true;
     return ARB_PENDING;
 }
 
 bool arb_call_wait(arb_call_t *call, uint16_t limit_ms)
 {
-    arb_turn_t *turn = call->turn;
-    if (!turn->waiting) {
-        turn->waiting = true;
-        turn->until_ms = call->now_ms + limit_ms;
+    arb_turn_t *turn = &call->api->turn;
+    const uint32_t until_ms = turn->since_ms + limit_ms;
+    if (pdcp_time_reached(call->now_ms, until_ms)) {
+        return false;
     }
-    return !pdcp_time_reached(call->now_ms, turn->until_ms);
-}
-
-uint8_t arb_call_again(arb_call_t *call)
-{
-    call->turn->waiting = true;
-    call->turn->until_ms = call->now_ms;
-    return ARB_PENDING;
-}
-
-uint8_t arb_call_started_limited(arb_call_t *call)
-{
-    arb_turn_t *turn = call->turn;
-    const uint32_t first_ms = turn->waiting ? turn->until_ms - ARB_HOST_NOT_READY_MS : call->now_ms;
-    (void)arb_call_started(call);
-    turn->waiting = true;
-    turn->until_ms = first_ms + ARB_HOST_ANSWER_MS;
-    return ARB_PENDING;
+    turn->until_ms = until_ms;
+    return true;
 }
 
 uint8_t arb_call_outcome(arb_call_t *call)
 {
-    const arb_turn_t *turn = call->turn;
-    if (!turn->ended && !arb_call_wait(call, 0)) {
+    const arb_turn_t *turn = &call->api->turn;
+    if (!turn->ended && !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
         pdcp_arb_give_up(call->arb, call->now_ms); /* its event ends the turn */
     }
+    call->answer_len = turn->value_len;
     return turn->ended ? arb_call_error(turn->status) : (uint8_t)ARB_PENDING;
 }
 

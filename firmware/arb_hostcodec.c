@@ -1,7 +1,5 @@
 #include "arb_hostcodec.h"
 
-#include <stddef.h>
-
 static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 {
     crc ^= byte;
@@ -17,10 +15,11 @@ static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 
 uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
 {
-    static const uint8_t covered[] = {2, 3, 4, 6, 7};
     uint8_t crc = 0;
-    for (size_t i = 0; i < sizeof covered; i++) {
-        crc = crc8_byte(crc, header[covered[i]]);
+    for (uint8_t i = 2; i < ARB_HOST_HEADER; i++) {
+        if (i != 5) { /* where it stands itself */
+            crc = crc8_byte(crc, header[i]);
+        }
     }
     return crc;
 }
@@ -58,14 +57,6 @@ void arb_host_put_u32(uint8_t *bytes, uint32_t value)
     arb_host_put_u16(&bytes[2], (uint16_t)(value >> 16));
 }
 
-void arb_host_decode_header(const uint8_t bytes[ARB_HOST_HEADER], arb_host_header_t *header)
-{
-    header->id = arb_host_get_u16(&bytes[2]);
-    header->reference = bytes[4];
-    header->crc8 = bytes[5];
-    header->size = arb_host_get_u16(&bytes[6]);
-}
-
 uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)
 {
     const uint16_t size = len != 0 ? (uint16_t)(len + ARB_HOST_CRC) : 0;
@@ -100,4 +91,11 @@ void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uin
 {
     arb_host_put_identity(bytes, identity);
     bytes[6] = index;
+}
+
+void arb_host_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input)
+{
+    arb_host_put_channel(&bytes[0], &input->source, input->source_index);
+    arb_host_put_channel(&bytes[7], &nodes->nodes[input->node].identity, input->index);
+    bytes[14] = input->link;
 }

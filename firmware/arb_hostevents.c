@@ -2,49 +2,34 @@
 
 #include <string.h>
 
-/* In the ring an event is its length, then what the message holds: kind, time, data. */
-
-static void ring_put(arb_hostevents_t *events, uint8_t byte)
-{
-    events->ring[(events->first + events->used) % ARB_EVENT_RING] = byte;
-    events->used++;
-}
-
-static uint8_t ring_take(arb_hostevents_t *events)
-{
-    const uint8_t byte = events->ring[events->first];
-    events->first = (uint8_t)((events->first + 1) % ARB_EVENT_RING);
-    events->used--;
-    return byte;
-}
+/* In the queue an event is its length, then what the message holds: kind, time, data. */
 
 static void put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind, const uint8_t *data,
                 uint8_t len)
 {
-    const uint8_t limit = kind == ARB_EVENT_FRAME ? ARB_EVENT_FRAMES : ARB_EVENT_RING;
+    const uint8_t limit = kind == ARB_EVENT_FRAME ? ARB_EVENT_FRAMES : ARB_EVENT_QUEUE;
+    const uint8_t size = (uint8_t)(1 + ARB_EVENT_HEAD + len);
+    uint8_t *bytes = &events->queue[events->used];
     if (!arb_hostevents_wants(events, kind)) {
         return;
     }
-    if (1u + ARB_EVENT_HEAD + len + events->used > limit) {
-        events->dropped[kind - 1]++;
+    if (events->used + size > limit) {
+        events->counters[kind]++;
         return;
     }
-    ring_put(events, (uint8_t)(ARB_EVENT_HEAD + len));
-    ring_put(events, (uint8_t)kind);
-    for (uint8_t shift = 0; shift < 32; shift = (uint8_t)(shift + 8)) {
-        ring_put(events, (uint8_t)((now_ms >> shift) & 0xFFu));
-    }
-    for (uint8_t i = 0; i < len; i++) {
-        ring_put(events, data[i]);
-    }
+    bytes[0] = (uint8_t)(ARB_EVENT_HEAD + len);
+    bytes[1] = (uint8_t)kind;
+    arb_host_put_u32(&bytes[2], now_ms);
+    memcpy(&bytes[1 + ARB_EVENT_HEAD], data, len);
+    events->used = (uint8_t)(events->used + size);
 }
 
 void arb_hostevents_set_mask(arb_hostevents_t *events, uint8_t mask)
 {
     events->mask = mask;
-    if (events->message_len != 0 && events->message_sent == 0 &&
+    if (events->out.len != 0 && events->out.sent == 0 &&
         !arb_hostevents_wants(events, (arb_event_kind_t)events->message[ARB_HOST_HEADER])) {
-        events->message_len = 0;
+        events->out.len = 0;
     }
 }
 
@@ -52,8 +37,8 @@ void arb_hostevents_end(arb_hostevents_t *events)
 {
     events->mask = 0;
     events->used = 0;
-    events->message_len = 0;
-    events->message_sent = 0;
+    events->out.len = 0;
+    events->out.sent = 0;
 }
 
 static void put_device(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind,
@@ -68,16 +53,12 @@ static void put_device(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind
 static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t number)
 {
     const pdcp_channel_t *input = &arb->bus.nodes.channels[number];
-    const bool removed = input->link == PDCP_LINK_NONE && arb->bus.link.input == number &&
-                         arb->bus.link.kind == PDCP_TODO_REMOVE;
+    const pdcp_link_t *job = &arb->bus.link;
     uint8_t data[ARB_EVENT_DATA_MAX];
-    if (removed) {
-        arb_host_put_channel(&data[0], &arb->bus.link.old_source, arb->bus.link.old_index);
-    } else {
-        arb_host_put_channel(&data[0], &input->source, input->source_index);
+    arb_host_put_link(data, &arb->bus.nodes, input);
+    if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
+        arb_host_put_channel(data, &job->old_source, job->old_index);
     }
-    arb_host_put_channel(&data[7], &arb->bus.nodes.nodes[input->node].identity, input->index);
-    data[14] = input->link;
     put(events, now_ms, ARB_EVENT_LINK, data, sizeof data);
 }
 
@@ -99,15 +80,11 @@ static arb_bus_state_t state_of(const pdcp_arb_t *arb)
 void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                              const pdcp_event_t *event)
 {
-    if (events->mask == 0) {
-        return;
-    }
     switch (event->kind) {
     case PDCP_EVENT_BOUND:
-        put_device(events, now_ms, ARB_EVENT_BOUND, &arb->bus.nodes.nodes[event->node]);
-        break;
     case PDCP_EVENT_LOST:
-        put_device(events, now_ms, ARB_EVENT_LOST, &arb->bus.nodes.nodes[event->node]);
+        put_device(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST,
+                   &arb->bus.nodes.nodes[event->node]);
         break;
     case PDCP_EVENT_LINK:
         put_link(events, arb, now_ms, event->channel);
@@ -142,24 +119,14 @@ void arb_hostevents_on_config(arb_hostevents_t *events, uint32_t now_ms, uint8_t
 
 bool arb_hostevents_next(arb_hostevents_t *events)
 {
-    while (events->message_len == 0 && events->used != 0) {
-        const uint8_t len = ring_take(events);
-        for (uint8_t i = 0; i < len; i++) {
-            events->message[ARB_HOST_HEADER + i] = ring_take(events);
-        }
+    while (events->out.len == 0 && events->used != 0) {
+        const uint8_t len = events->queue[0];
+        memcpy(&events->message[ARB_HOST_HEADER], &events->queue[1], len);
+        events->used = (uint8_t)(events->used - 1 - len);
+        memmove(events->queue, &events->queue[1 + len], events->used);
         if (arb_hostevents_wants(events, (arb_event_kind_t)events->message[ARB_HOST_HEADER])) {
-            events->message_len = (uint8_t)arb_host_finish(events->message, ARB_MSG_EVENT, 0, len);
+            events->out.len = arb_host_finish(events->message, ARB_MSG_EVENT, 0, len);
         }
     }
-    return events->message_len != 0;
-}
-
-void arb_hostevents_taken(arb_hostevents_t *events, uint8_t count)
-{
-    events->message_sent = (uint8_t)(events->message_sent + count);
-    if (events->message_sent == events->message_len) {
-        events->message_len = 0;
-        events->message_sent = 0;
-        events->sent++;
-    }
+    return events->out.len != 0;
 }

@@ -9,26 +9,26 @@
 /* The longest failure answer, 230Fh. */
 enum { FAILURE_MAX = ARB_HOST_HEADER + ARB_RESET_RESULTS + ARB_HOST_CRC };
 
-/* [API 3.2], and the extension group. */
+/* [API 3.2], and the extension group: id, size without CRC16, or longer, devices, waits, handler. */
 static const arb_message_t messages[] = {
-    {ARB_MSG_SYSTEM_INFO, 0, false, arb_hostbus_system_info},
-    {ARB_MSG_DEVICE_INFO, 1, false, arb_hostbus_device_info},
-    {ARB_MSG_INPUT_INFO, 1, false, arb_hostbus_input_info},
-    {ARB_MSG_OUTPUT_INFO, 1, false, arb_hostbus_output_info},
-    {ARB_MSG_LINK_INFO, 1, false, arb_hostbus_link_info},
-    {ARB_MSG_GET_PARAMETER, 8, false, arb_hostbus_get_parameter},
-    {ARB_MSG_SET_PARAMETER, 9, true, arb_hostbus_set_parameter},
-    {ARB_MSG_CONFIGURE_LINK, 14, false, arb_hostbus_configure_link},
-    {ARB_MSG_PASSTHROUGH, 15, false, arb_hostbus_passthrough},
-    {ARB_MSG_RESET, 1, false, arb_hostbus_reset},
-    {ARB_MSG_ARBITRATOR_INFO, 0, false, arb_hostext_arbitrator_info},
-    {ARB_MSG_SET_FLAGS, 1, false, arb_hostext_set_flags},
-    {ARB_MSG_ACTION, 2, false, arb_hostext_action},
-    {ARB_MSG_READ_CONFIGS, 3, false, arb_hostext_read_configs},
-    {ARB_MSG_WRITE_CONFIGS, 5, true, arb_hostext_write_configs},
-    {ARB_MSG_REMOVE_LINK, 7, false, arb_hostext_remove_link},
-    {ARB_MSG_STATISTICS, 1, false, arb_hostext_statistics},
-    {ARB_MSG_EVENT_STREAM, 1, false, arb_hostext_event_stream},
+    {ARB_MSG_SYSTEM_INFO, 0, 0, 0, 0, arb_hostbus_system_info},
+    {ARB_MSG_DEVICE_INFO, 1, 0, 0, 0, arb_hostbus_device_info},
+    {ARB_MSG_INPUT_INFO, 1, 0, 0, 0, arb_hostbus_input_info},
+    {ARB_MSG_OUTPUT_INFO, 1, 0, 0, 0, arb_hostbus_output_info},
+    {ARB_MSG_LINK_INFO, 1, 0, 0, 0, arb_hostbus_link_info},
+    {ARB_MSG_GET_PARAMETER, 8, 0, 1, 0, arb_hostbus_get_parameter},
+    {ARB_MSG_SET_PARAMETER, 9, 1, 1, 0, arb_hostbus_set_parameter},
+    {ARB_MSG_CONFIGURE_LINK, 14, 0, 2, 1, arb_hostbus_configure_link},
+    {ARB_MSG_PASSTHROUGH, 15, 0, 0, 0, arb_hostbus_passthrough},
+    {ARB_MSG_RESET, 1, 0, 0, 0, arb_hostbus_reset},
+    {ARB_MSG_ARBITRATOR_INFO, 0, 0, 0, 0, arb_hostext_arbitrator_info},
+    {ARB_MSG_SET_FLAGS, 1, 0, 0, 0, arb_hostext_set_flags},
+    {ARB_MSG_ACTION, 2, 0, 0, 1, arb_hostext_action},
+    {ARB_MSG_READ_CONFIGS, 3, 0, 0, 0, arb_hostext_read_configs},
+    {ARB_MSG_WRITE_CONFIGS, 5, 1, 0, 0, arb_hostext_write_configs},
+    {ARB_MSG_REMOVE_LINK, 7, 0, 1, 1, arb_hostext_remove_link},
+    {ARB_MSG_STATISTICS, 1, 0, 0, 0, arb_hostext_statistics},
+    {ARB_MSG_EVENT_STREAM, 1, 0, 0, 0, arb_hostext_event_stream},
 };
 
 void arb_hostapi_init(arb_hostapi_t *api)
@@ -74,7 +74,7 @@ static uint16_t finish(arb_hostapi_t *api, uint8_t *frame, const arb_hostrx_requ
 
 static bool urgent_has_room(const arb_hostapi_t *api)
 {
-    return api->urgent_out.len + FAILURE_MAX <= ARB_URGENT_BYTES;
+    return api->urgent_out.len <= ARB_URGENT_BYTES - FAILURE_MAX;
 }
 
 static void accept(arb_hostapi_t *api, const arb_hostrx_request_t *request)
@@ -95,21 +95,24 @@ static void accept(arb_hostapi_t *api, const arb_hostrx_request_t *request)
     api->held_used = (uint16_t)(api->held_used + request->len);
 }
 
-static void accept_all(arb_hostapi_t *api)
+/* False: no more can be taken before the host reads on. */
+static bool accept_all(arb_hostapi_t *api)
 {
     arb_hostrx_request_t request;
-    while (urgent_has_room(api) && arb_hostrx_next(&api->rx, &request)) {
+    while (urgent_has_room(api)) {
+        if (!arb_hostrx_next(&api->rx, &request)) {
+            return true;
+        }
         accept(api, &request);
     }
+    return false;
 }
 
 uint16_t arb_hostapi_on_bytes(arb_hostapi_t *api, uint32_t now_ms, const uint8_t *bytes, uint16_t len)
 {
     uint16_t taken = 0;
-    accept_all(api);
-    while (taken < len && urgent_has_room(api)) {
+    while (accept_all(api) && taken < len) {
         arb_hostrx_put(&api->rx, now_ms, bytes[taken++]);
-        accept_all(api);
     }
     api->counters[ARB_HOSTAPI_RECEIVED] += taken;
     return taken;
@@ -119,7 +122,7 @@ void arb_hostapi_on_event(arb_hostapi_t *api, const pdcp_arb_t *arb, uint32_t no
                           const pdcp_event_t *event)
 {
     if (api->turn.started) {
-        arb_hostbus_on_event(&api->turn, api->held[0].id, event);
+        arb_hostbus_on_event(api, event);
     }
     arb_hostevents_on_event(&api->events, arb, now_ms, event);
 }
@@ -129,10 +132,25 @@ static void drop_front(arb_hostapi_t *api)
 {
     const uint16_t len = api->held[0].len;
     api->held_count--;
-    memmove(&api->held[0], &api->held[1], api->held_count * sizeof api->held[0]);
+    memmove(&api->held[0], &api->held[1], sizeof api->held - sizeof api->held[0]);
     api->held_used = (uint16_t)(api->held_used - len);
     memmove(&api->held_bytes[0], &api->held_bytes[len], api->held_used);
     memset(&api->turn, 0, sizeof api->turn);
+}
+
+static uint8_t check_arguments(arb_call_t *call, const arb_message_t *message)
+{
+    const uint8_t *bytes = call->payload;
+    for (uint8_t i = 0; i < message->devices; i++, bytes += 7) {
+        call->place[i] = arb_call_device(call, bytes);
+        if (call->place[i] == PDCP_NONE) {
+            return ARB_ERR_DEVICE;
+        }
+    }
+    if (message->waits && (pdcp_arb_setup_running(call->arb) || arb_limb_is_busy(call->env->limb))) {
+        return arb_call_wait_ready(call);
+    }
+    return ARB_OK;
 }
 
 static uint8_t handle(arb_call_t *call)
@@ -151,7 +169,8 @@ static uint8_t handle(arb_call_t *call)
         turn->since_ms = call->now_ms;
     }
     turn->until_ms = call->now_ms + PDCP_TIME_FAR_MS;
-    return message->handler(call);
+    const uint8_t error = turn->started ? ARB_OK : check_arguments(call, message);
+    return error == ARB_OK ? message->handler(call) : error;
 }
 
 /* Serves the request at the front. False: it waits for the bus. */
@@ -246,7 +265,7 @@ bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now
     } else {
         api->rx.last_ms = now_ms; /* the silence is ours: bytes were not taken */
     }
-    accept_all(api);
+    (void)accept_all(api);
     do {
         flush(api, env->port);
     } while (api->held_count != 0 && !arb_hostapi_has_answer(api) && serve(api, env, now_ms));

@@ -121,7 +121,7 @@ bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now
 /* Do answers wait for room at the host? */
 static inline bool arb_hostapi_has_answer(const arb_hostapi_t *api)
 {
-    return api->answer_out.len != 0 || api->urgent_out.len != 0;
+    return (api->answer_out.len | api->urgent_out.len) != 0;
 }
 
 /* Do answers or events? */

@@ -80,13 +80,13 @@ uint8_t arb_hostbus_link_info(arb_call_t *call)
 
 /* Does the arbitrator itself decide what stands in this parameter: node ids and the sources of inputs? A
  * host's own value there would make two devices one, or a link that the tables do not know (D-API-11). */
-static bool is_arbitrators(const arb_call_t *call, uint8_t place, uint8_t index, uint8_t param)
+static bool is_arbitrators(const arb_call_t *call, uint8_t index, uint8_t param)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (index == 0) {
         return param == PDCP_DEV_NODE_ID;
     }
-    const uint8_t number = pdcp_nodes_channel(nodes, place, index);
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], index);
     if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT) {
         return param == PDCP_OUT_NODE_ID;
     }
@@ -102,18 +102,15 @@ static uint8_t parameter(arb_call_t *call, bool set)
     if (call->api->turn.started) {
         return arb_call_outcome(call);
     }
-    const uint8_t place = arb_call_device(call, call->payload);
+    const uint8_t place = call->place[0];
     const uint8_t channel = call->payload[6];
     const uint8_t param = call->payload[7];
-    if (place == PDCP_NONE) {
-        return ARB_ERR_DEVICE;
-    }
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (channel != 0 && nodes->nodes[place].state == PDCP_NODE_READY &&
         pdcp_nodes_channel(nodes, place, channel) == PDCP_NONE) {
         return ARB_ERR_CHANNEL;
     }
-    if (set && is_arbitrators(call, place, channel, param)) {
+    if (set && is_arbitrators(call, channel, param)) {
         return ARB_ERR_NOT_SUPPORTED;
     }
     const pdcp_status_t status =
@@ -132,36 +129,37 @@ uint8_t arb_hostbus_set_parameter(arb_call_t *call)
     return parameter(call, true);
 }
 
-static bool is_fed_by(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, const pdcp_channel_t *output)
-{
-    return input->link != PDCP_LINK_NONE && input->source_index == output->index &&
-           pdcp_identity_equal(&input->source, &nodes->nodes[output->node].identity);
-}
-
 /* Would the output feed a second input that wants it for itself? An inactive link counts: it comes back. */
-static bool breaks_sole_access(const pdcp_nodes_t *nodes, const pdcp_channel_t *output,
-                               const pdcp_channel_t *input)
+static bool breaks_sole_access(const arb_call_t *call, const pdcp_channel_t *input)
 {
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const pdcp_identity_t *source = &nodes->nodes[call->place[0]].identity;
     bool claimed = false;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *other = &nodes->channels[i];
-        if (is_fed_by(nodes, other, output) && profile_is_sole(other)) {
-            if (other == input) {
-                return false;
-            }
-            claimed = true;
+        if (other->link == PDCP_LINK_NONE || other->source_index != call->payload[6] ||
+            !pdcp_identity_equal(&other->source, source) || !profile_is_sole(other)) {
+            continue;
         }
+        if (other == input) {
+            return false;
+        }
+        claimed = true;
     }
     return claimed && profile_is_sole(input);
 }
 
-/* An output whose device could not be set up because all node ids are given out. */
-static bool has_no_node_id(const arb_call_t *call, const uint8_t *bytes)
+/* Why there is no link to be made: an output whose device could not be set up because all node ids are given
+ * out is one without a node id. */
+static uint8_t error_of_ends(const arb_call_t *call)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t number = pdcp_nodes_channel(nodes, arb_call_device(call, bytes), bytes[6]);
-    return number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT &&
-           nodes->channels[number].node_id == 0;
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], call->payload[6]);
+    if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT &&
+        nodes->channels[number].node_id == 0) {
+        return ARB_ERR_NO_NODE_ID;
+    }
+    return ARB_ERR_CHANNEL;
 }
 
 /* 2307h: output channel, input channel [API 3.3.23]. Once started, the bus speaks through PDCP_EVENT_WISH. */
@@ -173,23 +171,15 @@ uint8_t arb_hostbus_configure_link(arb_call_t *call)
         call->answer_len = 1;
         return error;
     }
-    if (arb_call_device(call, &call->payload[0]) == PDCP_NONE ||
-        arb_call_device(call, &call->payload[7]) == PDCP_NONE) {
-        return ARB_ERR_DEVICE;
-    }
-    if (arb_call_is_busy(call)) {
-        return arb_call_wait_ready(call);
-    }
-    const uint8_t output = arb_call_channel(call, &call->payload[0], PDCP_OUTPUT);
-    const uint8_t input = arb_call_channel(call, &call->payload[7], PDCP_INPUT);
+    const uint8_t output = arb_call_channel(call, 0, PDCP_OUTPUT);
+    const uint8_t input = arb_call_channel(call, 1, PDCP_INPUT);
     if (output == PDCP_NONE || input == PDCP_NONE) {
-        return has_no_node_id(call, &call->payload[0]) ? ARB_ERR_NO_NODE_ID : ARB_ERR_CHANNEL;
+        return error_of_ends(call);
     }
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    if (nodes->channels[output].node == nodes->channels[input].node) {
+    if (call->place[0] == call->place[1]) {
         return ARB_ERR_VALUE;
     }
-    if (breaks_sole_access(nodes, &nodes->channels[output], &nodes->channels[input])) {
+    if (breaks_sole_access(call, &call->arb->bus.nodes.channels[input])) {
         return ARB_ERR_SOLE_ACCESS;
     }
     return pdcp_arb_connect(call->arb, output, input) == PDCP_OK ? arb_call_started(call)
@@ -199,11 +189,10 @@ uint8_t arb_hostbus_configure_link(arb_call_t *call)
 /* To all devices: Suspend (with its time) or Release only [PDCP 3.2.4, 3.2.5]. */
 static uint8_t broadcast(arb_call_t *call, uint8_t dlc, const uint8_t *data)
 {
-    const bool suspend = data[0] == PDCP_SUSPEND;
-    if (!suspend && data[0] != PDCP_RELEASE) {
+    if (data[0] != PDCP_SUSPEND && data[0] != PDCP_RELEASE) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    if (dlc != (suspend ? 3 : 1)) {
+    if (dlc != (data[0] == PDCP_SUSPEND ? 3 : 1)) {
         return ARB_ERR_VALUE;
     }
     if (call->arb->silent) {
@@ -257,33 +246,26 @@ uint8_t arb_hostbus_passthrough(arb_call_t *call)
     if (memcmp(call->payload, all, sizeof all) == 0) {
         return broadcast(call, dlc, data);
     }
-    const uint8_t place = arb_call_device(call, call->payload);
-    if (place == PDCP_NONE) {
+    call->place[0] = arb_call_device(call, call->payload);
+    if (call->place[0] == PDCP_NONE) {
         return ARB_ERR_DEVICE;
     }
     if (!may_pass(data[0]) ||
-        (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, place, data[2], data[1]))) {
+        (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, data[2], data[1]))) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    const pdcp_status_t status = pdcp_arb_passthrough(call->arb, place, &call->answer[7], dlc);
+    const pdcp_status_t status = pdcp_arb_passthrough(call->arb, call->place[0], &call->answer[7], dlc);
     return status == PDCP_OK ? arb_call_started(call) : (uint8_t)ARB_ERR_BUSY;
 }
 
-static void start_resets(arb_call_t *call, uint8_t number)
+static void start_resets(arb_call_t *call, uint8_t first, uint8_t last)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     arb_turn_t *turn = &call->api->turn;
-    uint8_t rank = 0;
-    for (uint8_t place = 0; place < PDCP_DEVICES_MAX; place++) {
-        if (!pdcp_nodes_device_counts(&nodes->nodes[place])) {
-            continue;
-        }
-        rank++;
-        if (number == 0 || number == rank) {
-            profile_set_bit(turn->asked, place, true);
-            turn->open++;
-            (void)pdcp_arb_reset(call->arb, call->now_ms, place);
-        }
+    for (uint8_t number = first; number <= last; number++) {
+        const uint8_t place = pdcp_nodes_nth_device(&call->arb->bus.nodes, number);
+        profile_set_bit(turn->asked, place, true);
+        turn->open++;
+        (void)pdcp_arb_reset(call->arb, call->now_ms, place);
     }
 }
 
@@ -309,11 +291,13 @@ uint8_t arb_hostbus_reset(arb_call_t *call)
 {
     const arb_turn_t *turn = &call->api->turn;
     if (!turn->started) {
-        if (call->payload[0] > pdcp_nodes_count_devices(&call->arb->bus.nodes)) {
+        const uint8_t count = pdcp_nodes_count_devices(&call->arb->bus.nodes);
+        const uint8_t number = call->payload[0];
+        if (number > count) {
             return ARB_ERR_NUMBER;
         }
         (void)arb_call_started(call);
-        start_resets(call, call->payload[0]);
+        start_resets(call, number == 0 ? 1 : number, number == 0 ? count : number);
     }
     if (!arb_call_wait(call, PDCP_HOST_WAIT_MS)) {
         pdcp_arb_withdraw_resets(call->arb, call->now_ms);
@@ -328,31 +312,23 @@ uint8_t arb_hostbus_reset(arb_call_t *call)
     return ARB_ERR_NO_ANSWER;
 }
 
-static void on_reset(arb_turn_t *turn, const pdcp_event_t *event)
+/* Wishes and links may also be the planner's; the other events come only of what the host has asked for. */
+void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event)
 {
-    if (event->kind == PDCP_EVENT_SILENT) {
-        turn->open = 0; /* all devices are forgotten */
-    }
-    if (event->kind != PDCP_EVENT_RESET || turn->open == 0) {
-        return;
-    }
-    turn->open--;
-    if (event->status == PDCP_OK) {
-        profile_set_bit(turn->reset, event->node, true);
-    }
-}
-
-void arb_hostbus_on_event(arb_turn_t *turn, uint16_t id, const pdcp_event_t *event)
-{
-    if (id == ARB_MSG_RESET) {
-        on_reset(turn, event);
-    } else if (id == ARB_MSG_REMOVE_LINK) {
-        if (event->kind == PDCP_EVENT_LINK && event->channel == turn->channel) {
-            turn->status = event->status;
-        }
-    } else if (event->kind == (id == ARB_MSG_CONFIGURE_LINK ? PDCP_EVENT_WISH : PDCP_EVENT_REQUEST)) {
+    arb_turn_t *turn = &api->turn;
+    const uint16_t id = api->held[0].id;
+    if (event->kind == PDCP_EVENT_REQUEST ||
+        (event->kind == PDCP_EVENT_WISH && id == ARB_MSG_CONFIGURE_LINK)) {
         turn->ended = true;
         turn->status = event->status;
         turn->value_len = event->len;
+    } else if (event->kind == PDCP_EVENT_LINK && id == ARB_MSG_REMOVE_LINK &&
+               event->channel == turn->channel) {
+        turn->status = event->status;
+    } else if (event->kind == PDCP_EVENT_RESET) {
+        turn->open--;
+        profile_set_bit(turn->reset, event->node, event->status == PDCP_OK);
+    } else if (event->kind == PDCP_EVENT_SILENT) {
+        turn->open = 0; /* all devices are forgotten */
     }
 }

@@ -1,6 +1,7 @@
 #include "arb_hostcall.h"
 
 #include "pdcp_time.h"
+#include "profile_match.h"
 
 uint8_t arb_call_started(arb_call_t *call)
 {
@@ -30,11 +31,6 @@ uint8_t arb_call_outcome(arb_call_t *call)
     return turn->ended ? arb_call_error(turn->status) : (uint8_t)ARB_PENDING;
 }
 
-bool arb_call_is_busy(const arb_call_t *call)
-{
-    return pdcp_arb_setup_running(call->arb) || arb_limb_is_busy(call->env->limb);
-}
-
 uint8_t arb_call_wait_ready(arb_call_t *call)
 {
     return arb_call_wait(call, ARB_HOST_NOT_READY_MS) ? ARB_PENDING : ARB_ERR_NOT_READY;
@@ -45,18 +41,17 @@ uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
     const pdcp_identity_t identity = arb_host_get_identity(bytes);
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t place = pdcp_nodes_find(nodes, &identity);
-    return place != PDCP_NONE && nodes->nodes[place].state != PDCP_NODE_LOST ? place : PDCP_NONE;
-}
-
-uint8_t arb_call_channel(const arb_call_t *call, const uint8_t *bytes, uint8_t transfer)
-{
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t place = arb_call_device(call, bytes);
-    if (place == PDCP_NONE || nodes->nodes[place].state != PDCP_NODE_READY) {
+    if (place != PDCP_NONE && nodes->nodes[place].state == PDCP_NODE_LOST) {
         return PDCP_NONE;
     }
-    const uint8_t number = pdcp_nodes_channel(nodes, place, bytes[6]);
-    return number != PDCP_NONE && nodes->channels[number].transfer == transfer ? number : PDCP_NONE;
+    return place;
+}
+
+uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
+{
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[end], call->payload[7 * end + 6]);
+    return profile_is_ready(nodes, number, transfer) ? number : PDCP_NONE;
 }
 
 uint8_t arb_call_error(int8_t status)

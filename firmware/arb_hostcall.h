@@ -19,16 +19,20 @@ typedef struct {
     uint32_t now_ms;
     uint8_t *payload; /* of the request; stays where it is until the request is answered */
     uint16_t len;
-    uint8_t *answer; /* payload of the success answer, ARB_HOST_ANSWER_MAX bytes; stays where it is too */
+    uint8_t place[2]; /* of the devices that the payload names */
+    uint8_t *answer;  /* payload of the success answer, ARB_HOST_ANSWER_MAX bytes; stays where it is too */
     uint16_t answer_len;
 } arb_call_t;
 
 typedef uint8_t (*arb_handler_t)(arb_call_t *call);
 
+/* What is made sure of before the handler is called first. */
 typedef struct {
     uint16_t id;
-    uint8_t len; /* of the payload */
-    bool longer; /* or longer */
+    unsigned len : 8;     /* of the payload; another one: ARB_ERR_SIZE */
+    unsigned longer : 1;  /* or longer */
+    unsigned devices : 2; /* that the payload names, at 0 and 7: their places, or ARB_ERR_DEVICE */
+    unsigned waits : 1;   /* for the end of a running setup or planner: it changes links (D-API-6) */
     arb_handler_t handler;
 } arb_message_t;
 
@@ -38,9 +42,6 @@ uint8_t arb_call_started(arb_call_t *call);
 /* Waits until limit_ms after the first call for this request, when the handler is called at the latest.
  * False: that time is over. */
 bool arb_call_wait(arb_call_t *call, uint16_t limit_ms);
-
-/* Is a setup or the planner running? What changes links waits for their end (D-API-6). */
-bool arb_call_is_busy(const arb_call_t *call);
 
 /* Waits for a running setup or planner, 2 s at most (D-API-6): ARB_PENDING, or ARB_ERR_NOT_READY. */
 uint8_t arb_call_wait_ready(arb_call_t *call);
@@ -52,15 +53,15 @@ uint8_t arb_call_outcome(arb_call_t *call);
 /* Place of the device that six bytes of a request name; PDCP_NONE: it is not on the bus. */
 uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes);
 
-/* Channel number of the seven bytes that name a channel; PDCP_NONE: the device has no such channel of this
- * direction, or is not set up. */
-uint8_t arb_call_channel(const arb_call_t *call, const uint8_t *bytes, uint8_t transfer);
+/* Channel number of the channel that the payload names at this end, whose device was found; PDCP_NONE: the
+ * device has no such channel of this direction, or is not set up. */
+uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer);
 
 /* The error code for a pdcp_status_t. */
 uint8_t arb_call_error(int8_t status);
 
 /* The bus has spoken: what the request at the front waits for may have come. */
-void arb_hostbus_on_event(arb_turn_t *turn, uint16_t id, const pdcp_event_t *event);
+void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event);
 
 /* The handlers, by the names of their messages. */
 uint8_t arb_hostbus_system_info(arb_call_t *call);

@@ -53,8 +53,12 @@ void arb_host_put_u16(uint8_t *bytes, uint16_t value)
 
 void arb_host_put_u32(uint8_t *bytes, uint32_t value)
 {
-    arb_host_put_u16(&bytes[0], (uint16_t)(value & 0xFFFFu));
-    arb_host_put_u16(&bytes[2], (uint16_t)(value >> 16));
+    const uint16_t low = (uint16_t)(value & 0xFFFFu);
+    const uint16_t high = (uint16_t)(value >> 16);
+    bytes[0] = (uint8_t)(low & 0xFFu);
+    bytes[1] = (uint8_t)(low >> 8);
+    bytes[2] = (uint8_t)(high & 0xFFu);
+    bytes[3] = (uint8_t)(high >> 8);
 }
 
 uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)

@@ -1,27 +1,28 @@
 #include "arb_hostevents.h"
 
+#include <stddef.h>
 #include <string.h>
 
 /* In the queue an event is its length, then what the message holds: kind, time, data. */
 
-static void put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind, const uint8_t *data,
-                uint8_t len)
+/* Puts the beginning of an event into the queue. Returns where its len bytes of data go; NULL: it is not
+ * wanted, or finds no room. */
+static uint8_t *put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind, uint8_t len)
 {
     const uint8_t limit = kind == ARB_EVENT_FRAME ? ARB_EVENT_FRAMES : ARB_EVENT_QUEUE;
-    const uint8_t size = (uint8_t)(1 + ARB_EVENT_HEAD + len);
     uint8_t *bytes = &events->queue[events->used];
     if (!arb_hostevents_wants(events, kind)) {
-        return;
+        return NULL;
     }
-    if (events->used + size > limit) {
+    if (events->used + 1 + ARB_EVENT_HEAD + len > limit) {
         events->counters[kind]++;
-        return;
+        return NULL;
     }
     bytes[0] = (uint8_t)(ARB_EVENT_HEAD + len);
     bytes[1] = (uint8_t)kind;
     arb_host_put_u32(&bytes[2], now_ms);
-    memcpy(&bytes[1 + ARB_EVENT_HEAD], data, len);
-    events->used = (uint8_t)(events->used + size);
+    events->used = (uint8_t)(events->used + 1 + bytes[0]);
+    return &bytes[1 + ARB_EVENT_HEAD];
 }
 
 void arb_hostevents_set_mask(arb_hostevents_t *events, uint8_t mask)
@@ -41,12 +42,15 @@ void arb_hostevents_end(arb_hostevents_t *events)
     events->out.sent = 0;
 }
 
-static void put_device(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind,
-                       const pdcp_node_t *node)
+static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
+                       const pdcp_event_t *event)
 {
-    uint8_t data[7];
-    arb_host_put_channel(data, &node->identity, node->node_id);
-    put(events, now_ms, kind, data, sizeof data);
+    const pdcp_node_t *node = &arb->bus.nodes.nodes[event->node];
+    uint8_t *data =
+        put(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST, 7);
+    if (data != NULL) {
+        arb_host_put_channel(data, &node->identity, node->node_id);
+    }
 }
 
 /* An input whose link was taken away has no source any more: the job that has done it still knows. */
@@ -54,18 +58,14 @@ static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t n
 {
     const pdcp_channel_t *input = &arb->bus.nodes.channels[number];
     const pdcp_link_t *job = &arb->bus.link;
-    uint8_t data[ARB_EVENT_DATA_MAX];
+    uint8_t *data = put(events, now_ms, ARB_EVENT_LINK, ARB_EVENT_DATA_MAX);
+    if (data == NULL) {
+        return;
+    }
     arb_host_put_link(data, &arb->bus.nodes, input);
     if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
         arb_host_put_channel(data, &job->old_source, job->old_index);
     }
-    put(events, now_ms, ARB_EVENT_LINK, data, sizeof data);
-}
-
-static void put_state(arb_hostevents_t *events, uint32_t now_ms, arb_bus_state_t state)
-{
-    const uint8_t data[] = {(uint8_t)state, events->tx_errors, events->rx_errors};
-    put(events, now_ms, ARB_EVENT_BUS_STATE, data, sizeof data);
 }
 
 /* A bus that is not there at all counts as off; on standby the arbitrator is silent, however the bus is. */
@@ -77,44 +77,49 @@ static arb_bus_state_t state_of(const pdcp_arb_t *arb)
     return arb->recovery.state < PDCP_BUS_OFF ? (arb_bus_state_t)arb->recovery.state : ARB_BUS_OFF;
 }
 
+static void put_state(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms)
+{
+    uint8_t *data = put(events, now_ms, ARB_EVENT_BUS_STATE, 3);
+    if (data != NULL) {
+        data[0] = (uint8_t)state_of(arb);
+        data[1] = events->tx_errors;
+        data[2] = events->rx_errors;
+    }
+}
+
 void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                              const pdcp_event_t *event)
 {
-    switch (event->kind) {
-    case PDCP_EVENT_BOUND:
-    case PDCP_EVENT_LOST:
-        put_device(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST,
-                   &arb->bus.nodes.nodes[event->node]);
-        break;
-    case PDCP_EVENT_LINK:
+    const pdcp_event_kind_t kind = event->kind;
+    if (kind == PDCP_EVENT_BOUND || kind == PDCP_EVENT_LOST) {
+        put_device(events, arb, now_ms, event);
+    } else if (kind == PDCP_EVENT_LINK) {
         put_link(events, arb, now_ms, event->channel);
-        break;
-    case PDCP_EVENT_STATE:
-    case PDCP_EVENT_SILENT:
-    case PDCP_EVENT_STARTED:
-        put_state(events, now_ms, state_of(arb));
-        break;
-    default:
-        break;
+    } else if (kind == PDCP_EVENT_STATE || kind == PDCP_EVENT_SILENT || kind == PDCP_EVENT_STARTED) {
+        put_state(events, arb, now_ms);
     }
 }
 
 void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const can_frame_t *frame)
 {
-    uint8_t data[3 + CAN_FRAME_DATA_MAX];
     if (frame->kind != CAN_FRAME_BASE || frame->dlc > CAN_FRAME_DATA_MAX) {
         return;
     }
-    arb_host_put_u16(&data[0], frame->id);
-    data[2] = frame->dlc;
-    memcpy(&data[3], frame->data, frame->dlc);
-    put(events, now_ms, ARB_EVENT_FRAME, data, (uint8_t)(3 + frame->dlc));
+    uint8_t *data = put(events, now_ms, ARB_EVENT_FRAME, (uint8_t)(3 + frame->dlc));
+    if (data != NULL) {
+        arb_host_put_u16(&data[0], frame->id);
+        data[2] = frame->dlc;
+        memcpy(&data[3], frame->data, frame->dlc);
+    }
 }
 
 void arb_hostevents_on_config(arb_hostevents_t *events, uint32_t now_ms, uint8_t active, uint8_t stored)
 {
-    const uint8_t data[] = {active, stored};
-    put(events, now_ms, ARB_EVENT_CONFIG, data, sizeof data);
+    uint8_t *data = put(events, now_ms, ARB_EVENT_CONFIG, 2);
+    if (data != NULL) {
+        data[0] = active;
+        data[1] = stored;
+    }
 }
 
 bool arb_hostevents_next(arb_hostevents_t *events)

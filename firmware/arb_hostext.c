@@ -2,6 +2,7 @@
 
 #include "arb_hostcall.h"
 #include "arb_version.h"
+#include "profile_match.h"
 
 /* 2401h */
 uint8_t arb_hostext_arbitrator_info(arb_call_t *call)
@@ -53,7 +54,7 @@ uint8_t arb_hostext_action(arb_call_t *call)
         call->answer_len = 2;
         return error;
     }
-    if (arb_call_is_busy(call) || arb_limb_is_starting(limb, call->arb)) {
+    if (arb_limb_is_starting(limb, call->arb)) {
         return arb_call_wait_ready(call);
     }
     error = arb_limb_act(limb, call->arb, call->now_ms, call->payload[0], call->payload[1]);
@@ -134,7 +135,7 @@ uint8_t arb_hostext_write_configs(arb_call_t *call)
     if (!turn->ended) {
         return ARB_PENDING;
     }
-    if (turn->status >= 0 && offset + (uint32_t)len == total) {
+    if (turn->status >= 0 && (uint16_t)(total - offset) == len) {
         arb_limb_on_written(limb, call->arb);
     }
     return error_of_config(call, turn->status);
@@ -144,49 +145,45 @@ uint8_t arb_hostext_write_configs(arb_call_t *call)
 uint8_t arb_hostext_remove_link(arb_call_t *call)
 {
     arb_turn_t *turn = &call->api->turn;
-    const pdcp_channel_t *channels = call->arb->bus.nodes.channels;
-    const uint8_t input = arb_call_channel(call, call->payload, PDCP_INPUT);
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (turn->started) {
-        if (input == PDCP_NONE || !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
+        if (!profile_is_ready(nodes, turn->channel, PDCP_INPUT) || !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
             return ARB_ERR_NO_ANSWER;
         }
-        return channels[input].link == PDCP_LINK_NONE ? arb_call_error(turn->status) : ARB_PENDING;
+        return nodes->channels[turn->channel].link == PDCP_LINK_NONE ? arb_call_error(turn->status)
+                                                                     : ARB_PENDING;
     }
-    if (arb_call_device(call, call->payload) == PDCP_NONE) {
-        return ARB_ERR_DEVICE;
-    }
-    if (arb_call_is_busy(call)) {
-        return arb_call_wait_ready(call);
-    }
-    if (input == PDCP_NONE) {
+    turn->channel = arb_call_channel(call, 0, PDCP_INPUT);
+    if (turn->channel == PDCP_NONE) {
         return ARB_ERR_CHANNEL;
     }
-    if (!pdcp_arb_disconnect(call->arb, input)) {
+    if (!pdcp_arb_disconnect(call->arb, turn->channel)) {
         return ARB_OK; /* like a link that is made twice */
     }
-    turn->channel = input;
     return arb_call_started(call);
-}
-
-static void put_counter(arb_call_t *call, uint32_t value)
-{
-    arb_host_put_u32(&call->answer[call->answer_len], value);
-    call->answer_len = (uint16_t)(call->answer_len + 4);
 }
 
 static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count)
 {
     for (uint8_t i = 0; i < count; i++) {
-        put_counter(call, values[i]);
+        arb_host_put_u32(&call->answer[call->answer_len], values[i]);
+        call->answer_len = (uint16_t)(call->answer_len + 4);
     }
+}
+
+static void put_storage_counters(arb_call_t *call)
+{
+    const arb_store_t *store = call->env->store;
+    const arb_limb_t *limb = call->env->limb;
+    const uint32_t values[] = {store->failures, store->damaged, limb->flags.failures, limb->flags.damaged};
+    put_counters(call, values, 4);
+    put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
 }
 
 /* 2413h: group. */
 uint8_t arb_hostext_statistics(arb_call_t *call)
 {
     const arb_hostapi_t *api = call->api;
-    const arb_store_t *store = call->env->store;
-    const arb_limb_t *limb = call->env->limb;
     call->answer[0] = call->payload[0];
     call->answer_len = 1;
     switch (call->payload[0]) {
@@ -200,11 +197,7 @@ uint8_t arb_hostext_statistics(arb_call_t *call)
         put_counters(call, api->events.counters, 1 + ARB_EVENT_KINDS);
         return ARB_OK;
     case ARB_STATS_STORAGE:
-        put_counter(call, store->failures);
-        put_counter(call, store->damaged);
-        put_counter(call, limb->flags.failures);
-        put_counter(call, limb->flags.damaged);
-        put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
+        put_storage_counters(call);
         return ARB_OK;
     default:
         return ARB_ERR_NUMBER;

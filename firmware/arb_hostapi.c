@@ -201,12 +201,13 @@ static bool send(arb_hostapi_t *api, const arb_port_t *port, const uint8_t *byte
     }
     const uint16_t written = (uint16_t)port->host_write(port->ctx, &bytes[out->sent], left);
     api->counters[ARB_HOSTAPI_SENT] += written;
-    api->blocked = written < left;
     out->sent = (uint16_t)(out->sent + written);
-    if (!api->blocked) {
-        memset(out, 0, sizeof *out);
+    api->blocked = out->sent < out->len;
+    if (api->blocked) {
+        return false;
     }
-    return !api->blocked;
+    memset(out, 0, sizeof *out);
+    return true;
 }
 
 /* Sends on the event at the front. False: there is none, or no room for it. */

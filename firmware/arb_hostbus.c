@@ -11,10 +11,11 @@ enum { PASSTHROUGH = 15 }; /* bytes of the payload: dev, DLC, data */
 uint8_t arb_hostbus_system_info(arb_call_t *call)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    call->answer[0] = pdcp_nodes_count_devices(nodes);
-    call->answer[1] = pdcp_nodes_count_channels(nodes, PDCP_INPUT);
-    call->answer[2] = pdcp_nodes_count_channels(nodes, PDCP_OUTPUT);
-    call->answer[3] = pdcp_nodes_count_links(nodes);
+    uint8_t *answer = call->answer;
+    answer[0] = pdcp_nodes_count_devices(nodes);
+    answer[1] = pdcp_nodes_count_channels(nodes, PDCP_INPUT);
+    answer[2] = pdcp_nodes_count_channels(nodes, PDCP_OUTPUT);
+    answer[3] = pdcp_nodes_count_links(nodes);
     call->answer_len = 4;
     return ARB_OK;
 }

@@ -1,5 +1,7 @@
 #include "arb_hostext.h"
 
+#include <string.h>
+
 #include "arb_hostcall.h"
 #include "arb_version.h"
 #include "profile_match.h"
@@ -7,15 +9,12 @@
 /* 2401h */
 uint8_t arb_hostext_arbitrator_info(arb_call_t *call)
 {
+    static const uint8_t constants[] = {ARB_VERSION_PROTOCOL, ARB_VERSION_MAJOR, ARB_VERSION_MINOR,
+                                        ARB_VERSION_PATCH,    PDCP_DEVICES_MAX,  PDCP_CHANNELS_MAX,
+                                        PDCP_CHANNELS_MAX /* every input may have a link */};
     const arb_limb_t *limb = call->env->limb;
     uint8_t *answer = call->answer;
-    answer[0] = ARB_VERSION_PROTOCOL;
-    answer[1] = ARB_VERSION_MAJOR;
-    answer[2] = ARB_VERSION_MINOR;
-    answer[3] = ARB_VERSION_PATCH;
-    answer[4] = PDCP_DEVICES_MAX;
-    answer[5] = PDCP_CHANNELS_MAX;
-    answer[6] = PDCP_CHANNELS_MAX; /* every input may have a link */
+    memcpy(answer, constants, sizeof constants);
     answer[7] = arb_limb_state(limb);
     answer[8] = limb->active;
     answer[9] = limb->config.stored;
@@ -66,17 +65,13 @@ uint8_t arb_hostext_action(arb_call_t *call)
 
 static uint8_t error_of_config(arb_call_t *call, int8_t status)
 {
-    switch (status) {
-    case ARB_CONFIG_OK:
-    case ARB_CONFIG_UNCHANGED:
-        return ARB_OK;
-    case ARB_CONFIG_ERR_BUSY: /* a plan reads or saves */
+    if (status == ARB_CONFIG_ERR_BUSY) { /* a plan reads or saves */
         return arb_call_wait(call, ARB_HOST_NOT_READY_MS) ? ARB_PENDING : ARB_ERR_BUSY;
-    case ARB_CONFIG_ERR_VALUE:
-        return ARB_ERR_VALUE;
-    default:
-        return ARB_ERR_STORAGE;
     }
+    if (status == ARB_CONFIG_ERR_VALUE) {
+        return ARB_ERR_VALUE;
+    }
+    return status >= 0 ? ARB_OK : ARB_ERR_STORAGE;
 }
 
 /* 240Ah: offset, length. Read in pieces, a step each: the bus goes on between them. */

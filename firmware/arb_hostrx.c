@@ -68,15 +68,15 @@ void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms)
 
 /* What stands at the front? */
 typedef enum {
-    FRONT_OPEN, /* the beginning of a message; or one that may be truncated, before what looks like another's
-                 */
+    FRONT_OPEN, /* the next bytes have to tell */
     FRONT_MESSAGE,
     FRONT_TOO_LONG, /* a header whose size cannot be, of a set request that gets an answer (D-API-7) */
     FRONT_NOTHING
 } front_t;
 
-/* The message at the front, of total bytes, has a wrong checksum. Is it nothing, because another message
- * begins inside: a header with a right checksum, whose end may stand behind total? */
+/* The message at the front, of total bytes, has a wrong checksum. Nothing: another message begins inside, a
+ * header with a right checksum, whose end may stand behind total. Open: the beginning of one, and it is not
+ * all here yet. */
 static front_t look_inside(const arb_hostrx_t *rx, uint16_t total)
 {
     for (uint16_t at = next_sync(rx, 1); at < total; at = next_sync(rx, (uint16_t)(at + 1u))) {
@@ -95,7 +95,7 @@ static bool crc16_matches(const uint8_t *payload, uint16_t len)
     return len == 0 || arb_host_get_u16(&payload[len]) == arb_host_crc16(payload, len);
 }
 
-/* The whole message at the front, whose size is possible. */
+/* All of the message at the front is here. */
 static front_t check(arb_hostrx_t *rx, arb_hostrx_request_t *request)
 {
     const bool crc8_ok = crc8_matches(rx->bytes);
@@ -110,7 +110,7 @@ static front_t check(arb_hostrx_t *rx, arb_hostrx_request_t *request)
     return front;
 }
 
-/* Takes the header at the front. */
+/* Fills in the request as far as it is here. */
 static front_t look_at_front(arb_hostrx_t *rx, arb_hostrx_request_t *request)
 {
     const uint8_t *bytes = rx->bytes;

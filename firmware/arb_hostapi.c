@@ -40,7 +40,7 @@ void arb_hostapi_init(arb_hostapi_t *api)
 /* NULL: there is no message with this id. */
 static const arb_message_t *find_message(uint16_t id)
 {
-    for (uint8_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
+    for (size_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
         if (messages[i].id == id) {
             return &messages[i];
         }

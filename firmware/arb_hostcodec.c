@@ -1,5 +1,7 @@
 #include "arb_hostcodec.h"
 
+#include <stddef.h>
+
 static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 {
     crc ^= byte;
@@ -16,7 +18,7 @@ static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
 {
     uint8_t crc = 0;
-    for (uint8_t i = 2; i < ARB_HOST_HEADER; i++) {
+    for (size_t i = 2; i < ARB_HOST_HEADER; i++) {
         if (i != 5) { /* where it stands itself */
             crc = crc8_byte(crc, header[i]);
         }

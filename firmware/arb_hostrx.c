@@ -36,11 +36,9 @@ static void hunt(arb_hostrx_t *rx)
 
 void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte)
 {
-    hunt(rx);
     rx->bytes[rx->len++] = byte;
     rx->last_ms = now_ms;
     rx->overdue = false;
-    hunt(rx);
 }
 
 void arb_hostrx_clear(arb_hostrx_t *rx)

@@ -46,7 +46,7 @@ typedef struct {
 
 void arb_hostrx_init(arb_hostrx_t *rx);
 
-/* Takes one byte. Then call arb_hostrx_next until it returns false. */
+/* Takes one byte. Then call arb_hostrx_next until it returns false, before the next byte. */
 void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte);
 
 /* Gives up a message that has been silent for too long. Then call arb_hostrx_next until it returns false. */

@@ -170,6 +170,22 @@ static void test_a_truncated_message_without_a_pause(void)
     TEST_ASSERT_EQUAL(10, found);
 }
 
+/* D-API-8: its last bytes may be the beginning of another message, but no more comes: it is a whole one. */
+static void test_a_doubtful_message_is_handed_on_after_the_pause(void)
+{
+    uint8_t bytes[sizeof device];
+    memcpy(bytes, device, sizeof bytes);
+    bytes[9] = 0xFE;
+    bytes[10] = 0x19;
+    TEST_ASSERT_EQUAL(0, feed(bytes, sizeof bytes, 1000));
+    TEST_ASSERT_EQUAL(0, silence_until(1099));
+    TEST_ASSERT_EQUAL(1, silence_until(1100));
+    TEST_ASSERT_EQUAL_HEX16(0x2204, request.id);
+    TEST_ASSERT_EQUAL_HEX8(ARB_ERR_CRC, request.error);
+    TEST_ASSERT_EQUAL(1, rx.counters[ARB_HOSTRX_BAD_CRC16S]);
+    TEST_ASSERT_EQUAL(0, rx.counters[ARB_HOSTRX_GIVEN_UP]);
+}
+
 /* D-API-7: a set request with a longer value than any is answered, not just dropped. */
 static void test_a_value_that_is_too_long(void)
 {
@@ -231,6 +247,7 @@ int main(void)
     RUN_TEST(test_a_truncated_message_is_given_up);
     RUN_TEST(test_a_request_behind_a_truncated_one_is_found);
     RUN_TEST(test_a_truncated_message_without_a_pause);
+    RUN_TEST(test_a_doubtful_message_is_handed_on_after_the_pause);
     RUN_TEST(test_a_value_that_is_too_long);
     RUN_TEST(test_the_longest_value);
     RUN_TEST(test_nothing_stops_the_receiver);

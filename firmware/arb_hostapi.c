@@ -225,8 +225,10 @@ static bool flush_event(arb_hostapi_t *api, const arb_port_t *port)
  * answer, then the urgent ones. */
 static void flush(arb_hostapi_t *api, const arb_port_t *port)
 {
-    if ((api->events.out.sent == 0 || flush_event(api, port)) &&
-        send(api, port, api->answer, &api->answer_out)) {
+    if (api->events.out.sent != 0 && !flush_event(api, port)) {
+        return;
+    }
+    if (arb_hostapi_has_answer(api) && send(api, port, api->answer, &api->answer_out)) {
         (void)send(api, port, api->urgent, &api->urgent_out);
     }
 }

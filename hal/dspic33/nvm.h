@@ -9,7 +9,7 @@
 
 #include "hal_nvm.h"
 
-/* The only one there is; never NULL. i2c1_open and clock_start come first. */
+/* The only one there is; never NULL. Opens the I2C bus if it stands there. clock_start comes first. */
 hal_nvm_t *nvm_open(void);
 
 #endif

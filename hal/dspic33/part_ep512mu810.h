@@ -37,9 +37,6 @@ static inline void part_enable_interrupts(void)
     INTCON2bits.GIE = 1;
 }
 
-/* Two traps more than the smaller part has. */
-#define PART_GENERIC_TRAPS 1
-
 /* Program flash: a page of 1024 instructions, two instructions are programmed together. */
 #define PART_FLASH_PAGE 0x800uL
 #define PART_FLASH_ERASE_US 22900u

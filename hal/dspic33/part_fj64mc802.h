@@ -30,8 +30,6 @@
 /* There is no switch for all interrupts. */
 static inline void part_enable_interrupts(void) {}
 
-#define PART_GENERIC_TRAPS 0
-
 /* Program flash: a page of 512 instructions is erased at once (20 ms at least, the processor stands still), a
  * word is programmed alone (45 us). Addresses count by two. */
 #define PART_FLASH_PAGE 0x400uL

@@ -8,6 +8,9 @@
 
 #define CONFIG_NOWHERE 0xFFFFu /* an offset that no string has */
 
+/* A smaller memory has no room for a string at all: a negative array size does not compile. */
+typedef char arb_config_has_room[ARB_CONFIG_STRING_PAGES > 0 ? 1 : -1];
+
 enum { CONFIG_MEMBERS = 8 }; /* bytes of a header before its CRC */
 
 typedef enum { KIND_READ, KIND_SAVE, KIND_ERASE, KIND_RAW } kind_t;

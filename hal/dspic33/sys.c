@@ -29,8 +29,7 @@ static sys_reset_t sys_cause;
 static uint32_t sys_kicked_ms;
 
 /* Two instructions near the end of flash, written by tools/flash --serial; erased: no number. */
-static const uint16_t sys_serial_words[2]
-    __attribute__((space(prog), address(PART_SERIAL_AT), noload, unused));
+static const uint16_t sys_serial_words[2] PART_RESERVED(PART_SERIAL_AT);
 
 void sys_start(void)
 {
@@ -128,7 +127,6 @@ static uint32_t draw(void)
 
 uint32_t hal_sys_serial(void)
 {
-    (void)sys_serial_words;
     TBLPAG = (uint16_t)(PART_SERIAL_AT >> 16);
     const uint16_t low = __builtin_tblrdl((uint16_t)PART_SERIAL_AT);
     const uint16_t high = __builtin_tblrdl((uint16_t)PART_SERIAL_AT + 2u);

@@ -9,6 +9,9 @@
 
 #define CONFIG_NOWHERE 0x8000u /* an offset far behind every string */
 
+/* A smaller memory has no room for a string at all: a negative array size does not compile. */
+typedef char arb_config_has_room[ARB_CONFIG_STRING_PAGES > 0 ? 1 : -1];
+
 enum { CONFIG_MEMBERS = 8 }; /* bytes of a header before its CRC */
 
 /* Bytes read at a time: whole entries. */

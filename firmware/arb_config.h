@@ -21,16 +21,25 @@
 #include <stdint.h>
 
 #include "arb_area.h"
+#include "arb_flags.h"
+#include "arb_store.h"
 #include "profile_tlv.h"
+
+/* Pages that a string may take in a small memory: its share of what the others leave, without the header's.
+ */
+#define ARB_CONFIG_STRING_PAGES                                                                              \
+    ((ARB_NVM_PAGES - ARB_AREAS * (int)(ARB_STORE_AREA / ARB_PORT_NVM_PAGE) - ARB_AREAS) / ARB_AREAS - 1)
 
 enum {
     ARB_CONFIG_HEADER = 12,
-    ARB_CONFIG_AREA = 8192,       /* bytes of an area */
-    ARB_CONFIG_STRING_MAX = 7680, /* longest string: 8 configurations of 16 links take 7350 */
-    ARB_CONFIG_READ_MAX = 32,     /* bytes read at a time: 0.8 ms at a 24LC256 */
-    ARB_CONFIG_RAW_MAX = 128,     /* bytes that the host may read at a time */
-    ARB_CONFIG_PACE_MS = 1,       /* between two reads: the bus goes on */
-    ARB_CONFIG_POLLS_MAX = 50     /* a job that waits longer for the memory, 250 ms, has failed */
+    ARB_CONFIG_AREA = 8192, /* bytes of an area */
+    /* Longest string: 8 configurations of 16 links take 7350. */
+    ARB_CONFIG_STRING_MAX =
+        ARB_CONFIG_STRING_PAGES < 120 ? ARB_CONFIG_STRING_PAGES * (int)ARB_PORT_NVM_PAGE : 7680,
+    ARB_CONFIG_READ_MAX = 32, /* bytes read at a time: 0.8 ms at a 24LC256 */
+    ARB_CONFIG_RAW_MAX = 128, /* bytes that the host may read at a time */
+    ARB_CONFIG_PACE_MS = 1,   /* between two reads: the bus goes on */
+    ARB_CONFIG_POLLS_MAX = 50 /* a job that waits longer for the memory, 250 ms, has failed */
 };
 
 /* How a start or a job ended; 0 or more is good. */

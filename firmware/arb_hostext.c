@@ -170,7 +170,8 @@ static void put_driver_counters(arb_call_t *call)
 {
     const arb_port_t *port = call->env->port;
     for (uint8_t i = 0; i < (uint8_t)ARB_PORT_COUNTERS; i++) {
-        put_counter(call, port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0);
+        const uint32_t value = port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0;
+        put_counters(call, &value, 1);
     }
 }
 

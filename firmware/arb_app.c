@@ -29,9 +29,8 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
     app->work = true;
     pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
     arb_hostapi_init(&app->api);
-    arb_store_load(&app->store, port, &app->arb.bus.bind);
     arb_nvm_init(&app->nvm, port);
-    arb_store_share(&app->store, &app->nvm);
+    arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
     arb_limb_init(&app->limb, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
                   settings->no_autoconfig ? ARB_FLAG_AUTOCONFIGURE : 0, now_ms);
     app->api.strict = (arb_limb_flags(&app->limb) & ARB_FLAG_STRICT_CRC) != 0;
@@ -109,13 +108,15 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
     do {
         next_ms = pdcp_arb_step(&app->arb, now_ms);
         again = arb_limb_step(&app->limb, &app->arb, &app->nvm, now_ms);
-        again = arb_hostapi_step(&app->api, &env, now_ms) || again;
+        if (arb_hostapi_step(&app->api, &env, now_ms)) {
+            again = true;
+        }
     } while (again);
     if (pdcp_arb_take_restart(&app->arb) && app->port->can_restart != NULL) {
         app->port->can_restart(app->port->ctx);
     }
     send_frames(app, now_ms);
-    arb_store_step(&app->store, app->port, &app->arb.bus.bind, now_ms);
+    arb_store_step(&app->store, &app->arb.bus.bind, now_ms);
     next_ms = earlier(next_ms, arb_limb_next_ms(&app->limb, &app->arb, now_ms));
     next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
     app->next_ms = earlier(next_ms, arb_store_next_ms(&app->store, now_ms));

@@ -20,19 +20,26 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arb_nvm.h"
+#include "arb_area.h"
+#include "arb_flags.h"
+#include "arb_store.h"
 #include "profile_tlv.h"
 
+/* Pages that a string may take in a small memory: its share of what the others leave, without the header's.
+ */
+#define ARB_CONFIG_STRING_PAGES                                                                              \
+    ((ARB_NVM_PAGES - ARB_AREAS * (int)(ARB_STORE_AREA / ARB_PORT_NVM_PAGE) - ARB_AREAS) / ARB_AREAS - 1)
+
 enum {
-    ARB_CONFIG_VERSION = 1,
     ARB_CONFIG_HEADER = 12,
-    ARB_CONFIG_AREAS = 2,
-    ARB_CONFIG_AREA = 8192,       /* bytes of an area */
-    ARB_CONFIG_STRING_MAX = 7680, /* longest string: 8 configurations of 16 links take 7350 */
-    ARB_CONFIG_READ_MAX = 32,     /* bytes read at a time: 0.8 ms at a 24LC256 */
-    ARB_CONFIG_RAW_MAX = 128,     /* bytes that the host may read at a time */
-    ARB_CONFIG_PACE_MS = 1,       /* between two reads: the bus goes on */
-    ARB_CONFIG_POLLS_MAX = 50     /* a job that waits longer for the memory, 250 ms, has failed */
+    ARB_CONFIG_AREA = 8192, /* bytes of an area */
+    /* Longest string: 8 configurations of 16 links take 7350. */
+    ARB_CONFIG_STRING_MAX =
+        ARB_CONFIG_STRING_PAGES < 120 ? ARB_CONFIG_STRING_PAGES * (int)ARB_PORT_NVM_PAGE : 7680,
+    ARB_CONFIG_READ_MAX = 32, /* bytes read at a time: 0.8 ms at a 24LC256 */
+    ARB_CONFIG_RAW_MAX = 128, /* bytes that the host may read at a time */
+    ARB_CONFIG_PACE_MS = 1,   /* between two reads: the bus goes on */
+    ARB_CONFIG_POLLS_MAX = 50 /* a job that waits longer for the memory, 250 ms, has failed */
 };
 
 /* How a start or a job ended; 0 or more is good. */
@@ -68,36 +75,33 @@ typedef struct {
     /* What is stored. */
     uint8_t numbers[PROFILE_TLV_SET_BYTES]; /* of the configurations, a bit for each (profile_tlv_has) */
     uint8_t stored;                         /* how many there are */
-    uint8_t area;                           /* where the newest good copy stands; ARB_CONFIG_AREAS: nowhere */
-    uint16_t sequence;                      /* of that copy */
+    arb_area_t newest;
     uint16_t length;
     uint32_t crc; /* register behind the string */
     /* The job. */
-    uint8_t kind; /* what it is, what it is at: private to arb_config.c */
-    uint8_t phase;
+    uint8_t phase;  /* what it is at, 0: there is none; private to arb_config.c */
     bool writing;   /* a page is under way */
     uint8_t polls;  /* of a memory that is not ready */
     uint8_t number; /* save, erase */
     uint8_t count;  /* save: links */
-    bool same;      /* the new configuration is the stored one so far */
-    uint16_t at;    /* where in the string it reads, or in the new one it writes */
+    uint8_t stored_new;
+    uint8_t from;   /* the area that is read */
+    bool same;      /* the new string is the stored one so far: none of it was written yet */
+    uint16_t at;    /* where in the string that is read, compared or written, */
+    uint16_t until; /* and where this ends */
     uint16_t length_new;
     uint16_t count_at; /* where in the stored string the number of configurations stands, */
     uint16_t cut_from; /* what of it is replaced, */
     uint16_t cut_to;
-    uint16_t end_at;   /* and where its end stands */
+    uint16_t block;    /* and by how many bytes */
     uint32_t crc_new;  /* registers: of the new string, */
     uint32_t crc_read; /* of what was read */
     uint32_t due_ms;
     arb_config_link_t link;
     arb_config_done_t done;
     void *ctx;
-    const uint8_t *piece;
-    uint16_t piece_len;
-    /* The host's write, which outlasts the job of a piece. */
-    uint16_t raw_at;    /* bytes that are in */
-    uint16_t raw_total; /* 0: there is none */
-    bool raw_same;      /* all of them are the stored ones: none was written yet */
+    const uint8_t *piece; /* the host's; NULL: another job */
+    uint16_t raw_at;      /* bytes that are in of the host's write, which outlasts the job of a piece */
     profile_tlv_t reader;
 } arb_config_t;
 
@@ -112,7 +116,10 @@ void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
 uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms);
 
 /* A job is under way. */
-bool arb_config_busy(const arb_config_t *config);
+static inline bool arb_config_busy(const arb_config_t *config)
+{
+    return config->phase != 0;
+}
 
 /* Whether this configuration is stored. */
 static inline bool arb_config_has(const arb_config_t *config, uint8_t number)

@@ -2,71 +2,41 @@
 
 #include <string.h>
 
-#include "arb_crc.h"
-#include "pdcp_codec.h"
 #include "pdcp_time.h"
 
-enum { FLAGS_NOT_WRITING = 0xFF };
-
-/* The longest record is a page. */
-enum { FLAGS_LENGTH_MAX = (int)ARB_PORT_NVM_PAGE - ARB_FLAGS_HEADER - ARB_FLAGS_CRC };
-
-static uint16_t page_address(uint8_t page)
+static void put_setting(const void *table, uint8_t k, uint8_t *entry)
 {
-    return (uint16_t)(ARB_NVM_FLAGS_AT + (uint16_t)(page * ARB_PORT_NVM_PAGE));
+    (void)k;
+    *entry = ((const arb_flags_t *)table)->flags;
 }
 
-static uint8_t next_page(const arb_flags_t *flags)
+static void take_setting(void *table, uint8_t k, const uint8_t *entry)
 {
-    return flags->page == 0 ? 1 : 0;
-}
-
-typedef enum { PAGE_EMPTY, PAGE_DAMAGED, PAGE_GOOD } page_state_t;
-
-static page_state_t check_page(const arb_nvm_t *nvm, uint8_t page, uint8_t record[ARB_PORT_NVM_PAGE])
-{
-    if (!nvm->port->nvm_read(nvm->port->ctx, page_address(page), record, ARB_PORT_NVM_PAGE) ||
-        (record[0] == 0xFF && record[1] == 0xFF)) {
-        return PAGE_EMPTY;
+    if (k == 0) { /* a later version has more of them */
+        ((arb_flags_t *)table)->flags = *entry & ARB_FLAGS_STORED;
     }
-    const uint8_t length = record[3];
-    if (record[0] != 'P' || record[1] != 'F' || record[2] != ARB_FLAGS_VERSION || length < ARB_FLAGS_LENGTH ||
-        length > FLAGS_LENGTH_MAX) {
-        return PAGE_DAMAGED;
-    }
-    const uint32_t crc =
-        arb_crc32(ARB_CRC32_INIT, record, (uint16_t)(ARB_FLAGS_HEADER + length + ARB_FLAGS_CRC));
-    return crc == ARB_CRC32_RESIDUE ? PAGE_GOOD : PAGE_DAMAGED;
 }
+
+/* A page is an area, an entry is a setting. */
+static const arb_record_t flags_record = {.address = ARB_NVM_FLAGS_AT,
+                                          .size = ARB_PORT_NVM_PAGE,
+                                          .letter = 'F',
+                                          .entry = 1,
+                                          .put = put_setting,
+                                          .take = take_setting};
 
 void arb_flags_load(arb_flags_t *flags, arb_nvm_t *nvm)
 {
     memset(flags, 0, sizeof *flags);
-    flags->page = ARB_FLAGS_PAGES;
-    flags->stored = ARB_FLAGS_FACTORY;
-    flags->writing = FLAGS_NOT_WRITING;
-    for (uint8_t page = 0; page < (uint8_t)ARB_FLAGS_PAGES; page++) {
-        uint8_t record[ARB_PORT_NVM_PAGE];
-        const page_state_t state = check_page(nvm, page, record);
-        if (state == PAGE_DAMAGED) {
-            flags->damaged++;
-        }
-        if (state != PAGE_GOOD) {
-            continue;
-        }
-        const uint16_t sequence = pdcp_value_u16(record, ARB_FLAGS_HEADER, 4);
-        if (flags->page == (uint8_t)ARB_FLAGS_PAGES || (int16_t)(uint16_t)(sequence - flags->sequence) > 0) {
-            flags->page = page;
-            flags->sequence = sequence;
-            flags->stored = record[ARB_FLAGS_HEADER] & ARB_FLAGS_STORED;
-        }
-    }
-    flags->flags = flags->stored;
+    flags->flags = ARB_FLAGS_FACTORY;
+    arb_record_load(&flags_record, nvm, &flags->newest, &flags->damaged, flags);
+    flags->stored = flags->flags;
+    flags->writing = flags->flags;
 }
 
 static bool is_idle(const arb_flags_t *flags)
 {
-    return flags->writing == FLAGS_NOT_WRITING && flags->flags == flags->stored;
+    return flags->writing == flags->stored && flags->flags == flags->stored;
 }
 
 void arb_flags_set(arb_flags_t *flags, uint8_t value, uint32_t now_ms)
@@ -77,62 +47,36 @@ void arb_flags_set(arb_flags_t *flags, uint8_t value, uint32_t now_ms)
     flags->flags = value & ARB_FLAGS_STORED;
 }
 
+/* A record is one page. */
 static bool write_record(arb_flags_t *flags, const arb_nvm_t *nvm)
 {
-    uint8_t record[ARB_FLAGS_HEADER + ARB_FLAGS_LENGTH + ARB_FLAGS_CRC] = {'P', 'F', ARB_FLAGS_VERSION,
-                                                                           ARB_FLAGS_LENGTH};
-    const uint16_t length = ARB_FLAGS_HEADER + ARB_FLAGS_LENGTH;
-    pdcp_put_u16(&record[4], (uint16_t)(flags->sequence + 1));
-    record[ARB_FLAGS_HEADER] = flags->flags;
-    const uint32_t crc = ~arb_crc32(ARB_CRC32_INIT, record, length);
-    pdcp_put_u16(&record[length], (uint16_t)(crc & 0xFFFFu));
-    pdcp_put_u16(&record[length + 2], (uint16_t)(crc >> 16));
-    return nvm->port->nvm_write(nvm->port->ctx, page_address(next_page(flags)), record, sizeof record);
-}
-
-static void retry_later(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms)
-{
-    flags->writing = FLAGS_NOT_WRITING;
-    flags->failures = (uint8_t)(flags->failures + (flags->failures != 0xFF ? 1 : 0));
-    flags->due_ms = now_ms + ARB_FLAGS_RETRY_MS;
-    arb_nvm_give(nvm, ARB_NVM_FLAGS);
-}
-
-/* The page under way is in the memory. */
-static void end_write(arb_flags_t *flags)
-{
-    flags->sequence++;
-    flags->page = next_page(flags);
-    flags->stored = flags->writing;
-    flags->writing = FLAGS_NOT_WRITING;
+    arb_record_copy_t copy = {0, 0};
+    flags->writing = flags->flags;
+    return arb_record_write(&flags_record, nvm, &flags->newest, ARB_FLAGS_LENGTH, flags, &copy);
 }
 
 void arb_flags_step(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms)
 {
-    if (is_idle(flags) || pdcp_time_before(now_ms, flags->due_ms)) {
+    if (is_idle(flags)) {
         return;
     }
-    flags->due_ms = now_ms + ARB_NVM_POLL_MS;
-    if (!arb_nvm_take(nvm, ARB_NVM_FLAGS)) {
-        return;
-    }
-    const int8_t status = nvm->port->nvm_status(nvm->port->ctx);
+    const int8_t status = arb_nvm_poll(nvm, ARB_NVM_FLAGS, &flags->due_ms, now_ms);
     if (status > 0) {
         return;
     }
-    if (flags->writing != FLAGS_NOT_WRITING) {
-        if (status < 0) {
-            retry_later(flags, nvm, now_ms);
-            return;
-        }
-        end_write(flags);
+    if (flags->writing != flags->stored && status == 0) { /* the page under way is in the memory */
+        arb_record_written(&flags->newest);
+        flags->stored = flags->writing;
     }
     if (is_idle(flags)) {
         arb_nvm_give(nvm, ARB_NVM_FLAGS);
-    } else if (write_record(flags, nvm)) {
-        flags->writing = flags->flags;
-    } else {
-        retry_later(flags, nvm, now_ms);
+    } else if (flags->writing != flags->stored || !write_record(flags, nvm)) { /* it or the next one failed */
+        flags->writing = flags->stored;
+        if (flags->failures != 0xFF) {
+            flags->failures++;
+        }
+        flags->due_ms = now_ms + ARB_FLAGS_RETRY_MS;
+        arb_nvm_give(nvm, ARB_NVM_FLAGS);
     }
 }
 

@@ -14,14 +14,10 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arb_nvm.h"
+#include "arb_area.h"
 
 enum {
-    ARB_FLAGS_VERSION = 1,
-    ARB_FLAGS_PAGES = 2,
-    ARB_FLAGS_HEADER = 6,
     ARB_FLAGS_LENGTH = 1, /* bytes of settings that are written */
-    ARB_FLAGS_CRC = 4,
     ARB_FLAGS_RETRY_MS = 500
 };
 
@@ -38,13 +34,12 @@ enum {
 
 typedef struct {
     uint32_t due_ms;
-    uint16_t sequence; /* of the newest good copy */
-    uint8_t page;      /* where it stands; ARB_FLAGS_PAGES: nowhere */
-    uint8_t flags;     /* as they are to be */
-    uint8_t stored;    /* as they stand in the memory; those of the factory when nothing does */
-    uint8_t writing;   /* flags of the page under way; FFh: none is */
-    uint8_t failures;  /* writes that failed, since the start, FFh at most */
-    uint8_t damaged;   /* pages that were neither empty nor good at the start */
+    arb_area_t newest;
+    uint8_t flags;    /* as they are to be */
+    uint8_t stored;   /* as they stand in the memory; those of the factory when nothing does */
+    uint8_t writing;  /* flags of the page under way; those that are stored: none is */
+    uint8_t failures; /* writes that failed, since the start, FFh at most */
+    uint8_t damaged;  /* pages that were neither empty nor good at the start */
 } arb_flags_t;
 
 /* Reads the newest good copy. Blocks for as long as the memory needs to be read. */

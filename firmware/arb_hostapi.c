@@ -6,8 +6,30 @@
 #include "arb_hostcall.h"
 #include "pdcp_time.h"
 
-/* Payloads of failure answers: an error code, but of 230Dh the results. */
-enum { RESULTS = 8, FAILURE_MAX = ARB_HOST_HEADER + RESULTS + ARB_HOST_CRC };
+/* The longest failure answer, 230Fh. */
+enum { FAILURE_MAX = ARB_HOST_HEADER + ARB_RESET_RESULTS + ARB_HOST_CRC };
+
+/* [API 3.2], and the extension group: id, size without CRC16, or longer, devices, waits, handler. */
+static const arb_message_t messages[] = {
+    {ARB_MSG_SYSTEM_INFO, 0, 0, 0, 0, arb_hostbus_system_info},
+    {ARB_MSG_DEVICE_INFO, 1, 0, 0, 0, arb_hostbus_device_info},
+    {ARB_MSG_INPUT_INFO, 1, 0, 0, 0, arb_hostbus_input_info},
+    {ARB_MSG_OUTPUT_INFO, 1, 0, 0, 0, arb_hostbus_output_info},
+    {ARB_MSG_LINK_INFO, 1, 0, 0, 0, arb_hostbus_link_info},
+    {ARB_MSG_GET_PARAMETER, 8, 0, 1, 0, arb_hostbus_get_parameter},
+    {ARB_MSG_SET_PARAMETER, 9, 1, 1, 0, arb_hostbus_set_parameter},
+    {ARB_MSG_CONFIGURE_LINK, 14, 0, 2, 1, arb_hostbus_configure_link},
+    {ARB_MSG_PASSTHROUGH, 15, 0, 0, 0, arb_hostbus_passthrough},
+    {ARB_MSG_RESET, 1, 0, 0, 0, arb_hostbus_reset},
+    {ARB_MSG_ARBITRATOR_INFO, 0, 0, 0, 0, arb_hostext_arbitrator_info},
+    {ARB_MSG_SET_FLAGS, 1, 0, 0, 0, arb_hostext_set_flags},
+    {ARB_MSG_ACTION, 2, 0, 0, 1, arb_hostext_action},
+    {ARB_MSG_READ_CONFIGS, 3, 0, 0, 0, arb_hostext_read_configs},
+    {ARB_MSG_WRITE_CONFIGS, 5, 1, 0, 0, arb_hostext_write_configs},
+    {ARB_MSG_REMOVE_LINK, 7, 0, 1, 1, arb_hostext_remove_link},
+    {ARB_MSG_STATISTICS, 1, 0, 0, 0, arb_hostext_statistics},
+    {ARB_MSG_EVENT_STREAM, 1, 0, 0, 0, arb_hostext_event_stream},
+};
 
 void arb_hostapi_init(arb_hostapi_t *api)
 {
@@ -15,82 +37,84 @@ void arb_hostapi_init(arb_hostapi_t *api)
     arb_hostrx_init(&api->rx);
 }
 
+/* NULL: there is no message with this id. */
 static const arb_message_t *find_message(uint16_t id)
 {
-    const arb_message_t *message = arb_hostbus_find(id);
-    return message != NULL ? message : arb_hostext_find(id);
+    for (size_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
+        if (messages[i].id == id) {
+            return &messages[i];
+        }
+    }
+    return NULL;
 }
 
-/* Builds a failure answer, or 2200h for an id that does not exist. results: of 230Dh; NULL: it was not begun,
- * no device was reset (230Fh never carries an error code, D-API-3). Returns its length. */
-static uint16_t build_failure(arb_hostapi_t *api, uint8_t *frame, const arb_held_t *request, uint8_t error,
-                              const uint8_t *results)
+/* Completes the answer to a request: a success, or the failure of a reset that was begun, with the len bytes
+ * of payload that stand in frame[] already; another failure; or 2200h for an id that does not exist. 230Fh
+ * never carries an error code (D-API-3). Returns its length. */
+static uint16_t finish(arb_hostapi_t *api, uint8_t *frame, const arb_hostrx_request_t *request, uint8_t error,
+                       uint16_t len)
 {
-    const uint16_t id = (uint16_t)(request->id + 2);
+    uint16_t id = (uint16_t)(request->id + 1);
     if (find_message(request->id) == NULL) {
-        api->unknown++;
-        return arb_host_finish(frame, ARB_MSG_UNKNOWN_ID, request->reference, 0);
-    }
-    if (request->id == ARB_MSG_RESET) {
-        memset(&frame[ARB_HOST_HEADER], 0, RESULTS);
-        if (results != NULL) {
-            memcpy(&frame[ARB_HOST_HEADER], results, RESULTS);
+        api->counters[ARB_HOSTAPI_UNKNOWN]++;
+        id = ARB_MSG_UNKNOWN_ID;
+        len = 0;
+    } else if (error != ARB_OK) {
+        id++;
+        if (request->id != ARB_MSG_RESET) {
+            frame[ARB_HOST_HEADER] = error;
+            len = 1;
+        } else if (error != ARB_ERR_NO_ANSWER) { /* it was not begun, no device was reset */
+            memset(&frame[ARB_HOST_HEADER], 0, ARB_RESET_RESULTS);
+            len = ARB_RESET_RESULTS;
         }
-        return arb_host_finish(frame, id, request->reference, RESULTS);
     }
-    frame[ARB_HOST_HEADER] = error;
-    return arb_host_finish(frame, id, request->reference, 1);
+    return arb_host_finish(frame, id, request->reference, len);
 }
 
 static bool urgent_has_room(const arb_hostapi_t *api)
 {
-    return api->urgent_len + FAILURE_MAX <= ARB_URGENT_BYTES;
+    return api->urgent_out.len <= ARB_URGENT_BYTES - FAILURE_MAX;
 }
 
 static void accept(arb_hostapi_t *api, const arb_hostrx_request_t *request)
 {
-    const arb_held_t what = {
-        .id = request->id, .reference = request->reference, .at = api->held_used, .len = request->len};
-    api->requests++;
+    api->counters[ARB_HOSTAPI_REQUESTS]++;
     if (api->held_count == ARB_HELD_MAX || request->len > ARB_HELD_BYTES - api->held_used) {
-        uint8_t *frame = &api->urgent[api->urgent_len];
-        api->busy++;
-        api->urgent_len = (uint8_t)(api->urgent_len + build_failure(api, frame, &what, ARB_ERR_BUSY, NULL));
+        uint8_t *frame = &api->urgent[api->urgent_out.len];
+        api->counters[ARB_HOSTAPI_BUSY]++;
+        api->urgent_out.len = (uint16_t)(api->urgent_out.len + finish(api, frame, request, ARB_ERR_BUSY, 0));
         return;
     }
-    arb_held_t *held = &api->held[api->held_count++];
-    *held = what;
-    if (request->too_long) {
-        held->error = ARB_ERR_SIZE;
-    } else if (api->strict && !request->crc_ok) {
-        held->error = ARB_ERR_CRC;
+    arb_hostrx_request_t *held = &api->held[api->held_count++];
+    *held = *request;
+    if (held->error == ARB_ERR_CRC && !api->strict) {
+        held->error = ARB_OK;
     }
-    if (request->len != 0) {
-        memcpy(&api->held_bytes[held->at], request->payload, request->len);
-    }
+    memcpy(&api->held_bytes[api->held_used], &api->rx.bytes[ARB_HOST_HEADER], request->len);
     api->held_used = (uint16_t)(api->held_used + request->len);
 }
 
-static void accept_all(arb_hostapi_t *api)
+/* False: no more can be taken before the host reads on. */
+static bool accept_all(arb_hostapi_t *api)
 {
     arb_hostrx_request_t request;
-    while (urgent_has_room(api) && arb_hostrx_next(&api->rx, &request)) {
+    while (urgent_has_room(api)) {
+        if (!arb_hostrx_next(&api->rx, &request)) {
+            return true;
+        }
         accept(api, &request);
     }
+    return false;
 }
 
 uint16_t arb_hostapi_on_bytes(arb_hostapi_t *api, uint32_t now_ms, const uint8_t *bytes, uint16_t len)
 {
     uint16_t taken = 0;
-    while (taken < len) {
-        accept_all(api);
-        if (!urgent_has_room(api)) {
-            break;
-        }
+    while (accept_all(api) && taken < len) {
         arb_hostrx_put(&api->rx, now_ms, bytes[taken++]);
     }
-    accept_all(api);
-    api->received += taken;
+    api->counters[ARB_HOSTAPI_RECEIVED] += taken;
     return taken;
 }
 
@@ -98,7 +122,7 @@ void arb_hostapi_on_event(arb_hostapi_t *api, const pdcp_arb_t *arb, uint32_t no
                           const pdcp_event_t *event)
 {
     if (api->turn.started) {
-        arb_hostbus_on_event(&api->turn, api->held[0].id, event);
+        arb_hostbus_on_event(api, event);
     }
     arb_hostevents_on_event(&api->events, arb, now_ms, event);
 }
@@ -108,112 +132,111 @@ static void drop_front(arb_hostapi_t *api)
 {
     const uint16_t len = api->held[0].len;
     api->held_count--;
-    memmove(&api->held[0], &api->held[1], api->held_count * sizeof api->held[0]);
-    for (uint8_t i = 0; i < api->held_count; i++) {
-        api->held[i].at = (uint16_t)(api->held[i].at - len);
-    }
+    memmove(&api->held[0], &api->held[1], sizeof api->held - sizeof api->held[0]);
     api->held_used = (uint16_t)(api->held_used - len);
     memmove(&api->held_bytes[0], &api->held_bytes[len], api->held_used);
     memset(&api->turn, 0, sizeof api->turn);
 }
 
-/* results: of 230Dh, when it has failed after it was begun. */
-static uint8_t handle(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms, uint16_t *answer_len,
-                      uint8_t *results)
+static uint8_t check_arguments(arb_call_t *call, const arb_message_t *message)
 {
-    const arb_held_t *front = &api->held[0];
-    const arb_message_t *message = find_message(front->id);
-    if (message == NULL || front->error != ARB_OK) {
-        return message == NULL ? (uint8_t)ARB_ERR_SIZE : front->error;
+    const uint8_t *bytes = call->payload;
+    for (uint8_t i = 0; i < message->devices; i++, bytes += 7) {
+        call->place[i] = arb_call_device(call, bytes);
+        if (call->place[i] == PDCP_NONE) {
+            return ARB_ERR_DEVICE;
+        }
     }
-    if (front->len < message->len_min || front->len > message->len_max) {
+    if (message->waits && (pdcp_arb_setup_running(call->arb) || arb_limb_is_busy(call->env->limb))) {
+        return arb_call_wait_ready(call);
+    }
+    return ARB_OK;
+}
+
+static uint8_t handle(arb_call_t *call)
+{
+    const arb_hostrx_request_t *front = &call->api->held[0];
+    const arb_message_t *message = find_message(front->id);
+    arb_turn_t *turn = &call->api->turn;
+    if (front->error != ARB_OK) {
+        return front->error;
+    }
+    if (message == NULL || front->len < message->len || (front->len > message->len && !message->longer)) {
         return ARB_ERR_SIZE;
     }
-    arb_call_t call = {.api = api,
-                       .turn = &api->turn,
-                       .env = env,
-                       .arb = env->arb,
-                       .now_ms = now_ms,
-                       .payload = &api->held_bytes[front->at],
-                       .len = front->len,
-                       .answer = &api->answer[ARB_HOST_HEADER]};
-    const uint8_t error = message->handler(&call);
-    *answer_len = call.answer_len;
-    if (front->id == ARB_MSG_RESET) {
-        arb_hostbus_reset_results(&call, results);
+    if (!turn->waiting) {
+        turn->waiting = true;
+        turn->since_ms = call->now_ms;
     }
-    return error;
+    turn->until_ms = call->now_ms + PDCP_TIME_FAR_MS;
+    const uint8_t error = turn->started ? ARB_OK : check_arguments(call, message);
+    return error == ARB_OK ? message->handler(call) : error;
 }
 
 /* Serves the request at the front. False: it waits for the bus. */
 static bool serve(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms)
 {
-    const arb_held_t *front = &api->held[0];
-    uint8_t results[RESULTS] = {0};
-    uint16_t len = 0;
-    const uint8_t error = handle(api, env, now_ms, &len, results);
+    arb_call_t call = {.api = api,
+                       .env = env,
+                       .arb = env->arb,
+                       .now_ms = now_ms,
+                       .payload = api->held_bytes,
+                       .len = api->held[0].len,
+                       .answer = &api->answer[ARB_HOST_HEADER]};
+    const uint8_t error = handle(&call);
     if (error == ARB_PENDING) {
         return false;
     }
-    if (error == ARB_OK) {
-        api->answer_len = arb_host_finish(api->answer, (uint16_t)(front->id + 1), front->reference, len);
-    } else {
-        api->answer_len = build_failure(api, api->answer, front, error, results);
-    }
-    api->answer_sent = 0;
+    api->answer_out.len = finish(api, api->answer, &api->held[0], error, call.answer_len);
     drop_front(api);
     return true;
 }
 
-/* Returns how many bytes the host has taken. */
-static uint16_t write_host(arb_hostapi_t *api, const arb_port_t *port, const uint8_t *bytes, uint16_t len)
+/* Offers the host what of bytes[] is not sent yet. False: it has no room for all. */
+static bool send(arb_hostapi_t *api, const arb_port_t *port, const uint8_t *bytes, arb_out_t *out)
 {
-    const uint16_t written = (uint16_t)port->host_write(port->ctx, bytes, len);
-    api->sent += written;
-    api->blocked = written < len;
-    return written;
+    const uint16_t left = (uint16_t)(out->len - out->sent);
+    if (left == 0) {
+        return true;
+    }
+    const uint16_t written = (uint16_t)port->host_write(port->ctx, &bytes[out->sent], left);
+    api->counters[ARB_HOSTAPI_SENT] += written;
+    out->sent = (uint16_t)(out->sent + written);
+    api->blocked = out->sent < out->len;
+    if (api->blocked) {
+        return false;
+    }
+    memset(out, 0, sizeof *out);
+    return true;
 }
 
 /* Sends on the event at the front. False: there is none, or no room for it. */
 static bool flush_event(arb_hostapi_t *api, const arb_port_t *port)
 {
     arb_hostevents_t *events = &api->events;
-    if (!arb_hostevents_next(events)) {
+    if (!arb_hostevents_next(events) || !send(api, port, events->message, &events->out)) {
         return false;
     }
-    const uint8_t left = (uint8_t)(events->message_len - events->message_sent);
-    arb_hostevents_taken(events,
-                         (uint8_t)write_host(api, port, &events->message[events->message_sent], left));
-    return !api->blocked;
+    events->counters[0]++;
+    return true;
 }
 
 /* Sends what waits but for events that are not begun: first what is, so that no message is torn, then the
  * answer, then the urgent ones. */
 static void flush(arb_hostapi_t *api, const arb_port_t *port)
 {
-    if (api->events.message_sent != 0 && !flush_event(api, port)) {
+    if (api->events.out.sent != 0 && !flush_event(api, port)) {
         return;
     }
-    if (api->answer_len != 0) {
-        const uint16_t left = (uint16_t)(api->answer_len - api->answer_sent);
-        api->answer_sent =
-            (uint16_t)(api->answer_sent + write_host(api, port, &api->answer[api->answer_sent], left));
-        if (api->answer_sent < api->answer_len) {
-            return;
-        }
-        api->answer_len = 0;
-    }
-    if (api->urgent_len != 0) {
-        const uint8_t written = (uint8_t)write_host(api, port, api->urgent, api->urgent_len);
-        api->urgent_len = (uint8_t)(api->urgent_len - written);
-        memmove(api->urgent, &api->urgent[written], api->urgent_len);
+    if (arb_hostapi_has_answer(api) && send(api, port, api->answer, &api->answer_out)) {
+        (void)send(api, port, api->urgent, &api->urgent_out);
     }
 }
 
 /* Answers go first. */
 static void flush_events(arb_hostapi_t *api, const arb_port_t *port)
 {
-    while (api->answer_len == 0 && api->urgent_len == 0 && flush_event(api, port)) {
+    while (!arb_hostapi_has_answer(api) && flush_event(api, port)) {
     }
 }
 
@@ -240,18 +263,15 @@ void arb_hostapi_on_host_gone(arb_hostapi_t *api)
 bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms)
 {
     api->handed = false;
-    const bool refusing = !urgent_has_room(api);
-    if (!refusing) {
+    if (urgent_has_room(api)) {
         arb_hostrx_on_time(&api->rx, now_ms);
-    }
-    accept_all(api);
-    flush(api, env->port);
-    if (refusing) {
+    } else {
         api->rx.last_ms = now_ms; /* the silence is ours: bytes were not taken */
     }
-    while (api->held_count != 0 && api->answer_len == 0 && api->urgent_len == 0 && serve(api, env, now_ms)) {
+    (void)accept_all(api);
+    do {
         flush(api, env->port);
-    }
+    } while (api->held_count != 0 && !arb_hostapi_has_answer(api) && serve(api, env, now_ms));
     if (arb_limb_take_change(env->limb)) {
         arb_hostevents_on_config(&api->events, now_ms, env->limb->active, env->limb->config.stored);
     }
@@ -265,7 +285,7 @@ uint32_t arb_hostapi_next_ms(const arb_hostapi_t *api, uint32_t now_ms)
     if (arb_hostrx_is_inside(&api->rx)) {
         next_ms = api->rx.last_ms + ARB_HOSTRX_TIMEOUT_MS;
     }
-    const bool blocked = api->answer_len != 0 || api->urgent_len != 0; /* until the host reads on */
+    const bool blocked = arb_hostapi_has_answer(api); /* until the host reads on */
     if (api->turn.waiting && !blocked && pdcp_time_before(api->turn.until_ms, next_ms)) {
         next_ms = api->turn.until_ms;
     }

@@ -44,52 +44,49 @@ typedef struct {
     const arb_port_t *port;
 } arb_hostenv_t;
 
-typedef struct {
-    uint16_t id;
-    uint16_t at;  /* of the payload in held_bytes */
-    uint16_t len; /* of the payload */
-    uint8_t reference;
-    uint8_t error; /* found on reception: ARB_OK, ARB_ERR_CRC (strict), ARB_ERR_SIZE (too long) */
-} arb_held_t;
-
 /* How far the request at the front has come, when it cannot be answered at once. */
 typedef struct {
-    bool waiting;    /* the handler is to be called at until_ms at the latest */
-    bool started;    /* the bus works on it */
-    bool ended;      /* the bus has spoken: status, value_len */
-    int8_t status;   /* pdcp_status_t */
+    bool waiting;  /* the handler was called, first at since_ms, and is to be called at until_ms at the latest
+                    */
+    bool started;  /* the bus works on it */
+    bool ended;    /* the bus has spoken: status, value_len */
+    int8_t status; /* pdcp_status_t */
     uint8_t channel; /* 2410h: number of the input */
     uint8_t open;    /* 230Dh: devices whose reset has not ended */
     uint16_t value_len;
+    uint32_t since_ms;
     uint32_t until_ms;
     uint8_t asked[(PDCP_DEVICES_MAX + 7) / 8]; /* 230Dh: places of the devices that are to be reset */
     uint8_t reset[(PDCP_DEVICES_MAX + 7) / 8]; /* and that were */
 } arb_turn_t;
 
+/* What is counted, since the start. */
+typedef enum {
+    ARB_HOSTAPI_RECEIVED, /* bytes */
+    ARB_HOSTAPI_SENT,     /* bytes */
+    ARB_HOSTAPI_REQUESTS, /* messages received, those below included */
+    ARB_HOSTAPI_BUSY,     /* answered with 07h because four were held */
+    ARB_HOSTAPI_UNKNOWN,  /* answered with 2200h */
+    ARB_HOSTAPI_COUNTERS
+} arb_hostapi_counter_t;
+
+/* Small state stands first, as in pdcp_bus.h. */
 typedef struct {
-    arb_hostrx_t rx;
-    arb_held_t held[ARB_HELD_MAX];
-    uint8_t held_count;
-    uint8_t held_bytes[ARB_HELD_BYTES];
-    uint16_t held_used;
-
-    uint8_t answer[ARB_HOST_HEADER + ARB_HOST_ANSWER_MAX + ARB_HOST_CRC];
-    uint16_t answer_len; /* of the answer being sent; 0: none */
-    uint16_t answer_sent;
-    uint8_t urgent[ARB_URGENT_BYTES];
-    uint8_t urgent_len;
-    arb_hostevents_t events;
-
-    bool strict;  /* checksums are enforced (D-API-1) */
-    bool handed;  /* in this step the arbitrator was given something to do */
-    bool blocked; /* the host had no room for all when it was offered something last */
     arb_turn_t turn;
-
-    uint32_t received; /* bytes */
-    uint32_t sent;     /* bytes */
-    uint32_t requests; /* messages received, those below included */
-    uint32_t busy;     /* answered with 07h because four were held */
-    uint32_t unknown;  /* answered with 2200h */
+    arb_hostrx_request_t held[ARB_HELD_MAX]; /* in the order in which they came */
+    uint8_t held_count;
+    uint16_t held_used; /* bytes of held_bytes */
+    bool strict;        /* checksums are enforced (D-API-1) */
+    bool handed;        /* in this step the arbitrator was given something to do */
+    bool blocked;       /* the host had no room for all when it was offered something last */
+    arb_out_t answer_out;
+    arb_out_t urgent_out;
+    uint32_t counters[ARB_HOSTAPI_COUNTERS];
+    arb_hostevents_t events;
+    arb_hostrx_t rx;
+    uint8_t urgent[ARB_URGENT_BYTES];
+    uint8_t held_bytes[ARB_HELD_BYTES]; /* their payloads, without gaps */
+    uint8_t answer[ARB_HOST_HEADER + ARB_HOST_ANSWER_MAX + ARB_HOST_CRC];
 } arb_hostapi_t;
 
 void arb_hostapi_init(arb_hostapi_t *api);
@@ -121,10 +118,16 @@ void arb_hostapi_on_host_gone(arb_hostapi_t *api);
  * to do. */
 bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms);
 
-/* Do answers or events wait for room at the host? */
+/* Do answers wait for room at the host? */
+static inline bool arb_hostapi_has_answer(const arb_hostapi_t *api)
+{
+    return (api->answer_out.len | api->urgent_out.len) != 0;
+}
+
+/* Do answers or events? */
 static inline bool arb_hostapi_has_output(const arb_hostapi_t *api)
 {
-    return api->answer_len != 0 || api->urgent_len != 0 || arb_hostevents_wait(&api->events);
+    return arb_hostapi_has_answer(api) || arb_hostevents_wait(&api->events);
 }
 
 /* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when nothing depends on time. */

@@ -1,5 +1,4 @@
 /* Messages 2201h to 230Dh [API 3.3]. */
-#include <stddef.h>
 #include <string.h>
 
 #include "arb_hostcall.h"
@@ -9,13 +8,14 @@
 enum { PASSTHROUGH = 15 }; /* bytes of the payload: dev, DLC, data */
 
 /* 2201h: number of devices, inputs, outputs, links [API 3.3.2]. */
-static uint8_t system_info(arb_call_t *call)
+uint8_t arb_hostbus_system_info(arb_call_t *call)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    call->answer[0] = pdcp_nodes_count_devices(nodes);
-    call->answer[1] = pdcp_nodes_count_channels(nodes, PDCP_INPUT);
-    call->answer[2] = pdcp_nodes_count_channels(nodes, PDCP_OUTPUT);
-    call->answer[3] = pdcp_nodes_count_links(nodes);
+    uint8_t *answer = call->answer;
+    answer[0] = pdcp_nodes_count_devices(nodes);
+    answer[1] = pdcp_nodes_count_channels(nodes, PDCP_INPUT);
+    answer[2] = pdcp_nodes_count_channels(nodes, PDCP_OUTPUT);
+    answer[3] = pdcp_nodes_count_links(nodes);
     call->answer_len = 4;
     return ARB_OK;
 }
@@ -30,7 +30,7 @@ static void put_info(arb_call_t *call, const pdcp_identity_t *identity, uint8_t 
 }
 
 /* 2204h [API 3.3.5] */
-static uint8_t device_info(arb_call_t *call)
+uint8_t arb_hostbus_device_info(arb_call_t *call)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t place = pdcp_nodes_nth_device(nodes, call->payload[0]);
@@ -55,177 +55,151 @@ static uint8_t channel_info(arb_call_t *call, uint8_t transfer)
 }
 
 /* 2207h [API 3.3.8] */
-static uint8_t input_info(arb_call_t *call)
+uint8_t arb_hostbus_input_info(arb_call_t *call)
 {
     return channel_info(call, PDCP_INPUT);
 }
 
 /* 220Ah [API 3.3.11] */
-static uint8_t output_info(arb_call_t *call)
+uint8_t arb_hostbus_output_info(arb_call_t *call)
 {
     return channel_info(call, PDCP_OUTPUT);
 }
 
 /* 220Dh: output, input, status [API 3.3.14] */
-static uint8_t link_info(arb_call_t *call)
+uint8_t arb_hostbus_link_info(arb_call_t *call)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t number = pdcp_nodes_nth_link(nodes, call->payload[0]);
     if (number == PDCP_NONE) {
         return ARB_ERR_NUMBER;
     }
-    const pdcp_channel_t *input = &nodes->channels[number];
-    arb_host_put_channel(&call->answer[0], &input->source, input->source_index);
-    arb_host_put_channel(&call->answer[7], &nodes->nodes[input->node].identity, input->index);
-    call->answer[14] = input->link;
+    arb_host_put_link(call->answer, nodes, &nodes->channels[number]);
     call->answer_len = 15;
     return ARB_OK;
 }
 
 /* Does the arbitrator itself decide what stands in this parameter: node ids and the sources of inputs? A
  * host's own value there would make two devices one, or a link that the tables do not know (D-API-11). */
-static bool is_arbitrators(const arb_call_t *call, uint8_t place, uint8_t index, uint8_t param)
+static bool is_arbitrators(const arb_call_t *call, uint8_t index, uint8_t param)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (index == 0) {
         return param == PDCP_DEV_NODE_ID;
     }
-    const uint8_t number = pdcp_nodes_channel(nodes, place, index);
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], index);
     if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT) {
         return param == PDCP_OUT_NODE_ID;
     }
-    const bool names_source =
-        param == PDCP_IN_SOURCE_VID_PID || param == PDCP_IN_SOURCE_SERIAL || param == PDCP_IN_SOURCE_TYPE;
     const bool is_linked = number == PDCP_NONE || nodes->channels[number].link != PDCP_LINK_NONE;
-    return param == PDCP_IN_SOURCE_NODES || (names_source && is_linked);
+    return param >= PDCP_IN_SOURCE_VID_PID && param <= PDCP_IN_SOURCE_TYPE &&
+           (is_linked || param == PDCP_IN_SOURCE_NODES);
 }
 
 /* 2301h and 2304h: dev, channel index, parameter id, and when setting the value [API 3.3.17, 3.3.20]. Once
  * started, the bus speaks through PDCP_EVENT_REQUEST. */
 static uint8_t parameter(arb_call_t *call, bool set)
 {
-    const arb_turn_t *turn = call->turn;
-    if (turn->started) {
-        const uint8_t error = arb_call_outcome(call);
-        call->answer_len = set ? 0 : turn->value_len;
-        return error;
+    if (call->api->turn.started) {
+        return arb_call_outcome(call);
     }
-    const uint8_t place = arb_call_device(call, call->payload);
+    const uint8_t place = call->place[0];
     const uint8_t channel = call->payload[6];
     const uint8_t param = call->payload[7];
-    if (place == PDCP_NONE) {
-        return ARB_ERR_DEVICE;
-    }
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (channel != 0 && nodes->nodes[place].state == PDCP_NODE_READY &&
         pdcp_nodes_channel(nodes, place, channel) == PDCP_NONE) {
         return ARB_ERR_CHANNEL;
     }
-    if (set && is_arbitrators(call, place, channel, param)) {
+    if (set && is_arbitrators(call, channel, param)) {
         return ARB_ERR_NOT_SUPPORTED;
     }
     const pdcp_status_t status =
         set ? pdcp_arb_set(call->arb, place, channel, param, &call->payload[8], (uint16_t)(call->len - 8))
             : pdcp_arb_get(call->arb, place, channel, param, call->answer, PDCP_PARAMETER_MAX);
-    return status == PDCP_OK ? arb_call_started_limited(call) : ARB_ERR_BUSY;
+    return status == PDCP_OK ? arb_call_started(call) : ARB_ERR_BUSY;
 }
 
-static uint8_t get_parameter(arb_call_t *call)
+uint8_t arb_hostbus_get_parameter(arb_call_t *call)
 {
     return parameter(call, false);
 }
 
-static uint8_t set_parameter(arb_call_t *call)
+uint8_t arb_hostbus_set_parameter(arb_call_t *call)
 {
     return parameter(call, true);
 }
 
-static bool is_fed_by(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, uint8_t output)
-{
-    const pdcp_channel_t *source = &nodes->channels[output];
-    return input->node != PDCP_NONE && input->link != PDCP_LINK_NONE &&
-           input->source_index == source->index &&
-           pdcp_identity_equal(&input->source, &nodes->nodes[source->node].identity);
-}
-
-/* Would the output feed a second input that wants it for itself? An inactive link counts: it comes back. An
- * input of the output's own device cannot be fed at all. */
-static bool breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
-{
-    const pdcp_channel_t *channel = &nodes->channels[input];
-    if (!profile_is_sole(channel) || is_fed_by(nodes, channel, output) ||
-        channel->node == nodes->channels[output].node) {
-        return false;
-    }
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *other = &nodes->channels[i];
-        if (i != input && is_fed_by(nodes, other, output) && profile_is_sole(other)) {
-            return true;
-        }
-    }
-    return false;
-}
-
-/* An output whose device could not be set up because all node ids are given out. */
-static bool has_no_node_id(const arb_call_t *call, const uint8_t *bytes)
+/* Would the output feed a second input that wants it for itself? An inactive link counts: it comes back. */
+static bool breaks_sole_access(const arb_call_t *call, const pdcp_channel_t *input)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t place = arb_call_device(call, bytes);
-    const uint8_t number = nodes->nodes[place].state == PDCP_NODE_FAILED
-                               ? pdcp_nodes_channel(nodes, place, bytes[6])
-                               : (uint8_t)PDCP_NONE;
-    return number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT &&
-           nodes->channels[number].node_id == 0;
+    const pdcp_identity_t *source = &nodes->nodes[call->place[0]].identity;
+    bool claimed = false;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *other = &nodes->channels[i];
+        if (other->link == PDCP_LINK_NONE || other->source_index != call->payload[6] ||
+            !pdcp_identity_equal(&other->source, source) || !profile_is_sole(other)) {
+            continue;
+        }
+        if (other == input) {
+            return false;
+        }
+        claimed = true;
+    }
+    return claimed && profile_is_sole(input);
+}
+
+/* Why there is no link to be made: an output whose device could not be set up because all node ids are given
+ * out is one without a node id. */
+static uint8_t error_of_ends(const arb_call_t *call)
+{
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], call->payload[6]);
+    if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT &&
+        nodes->channels[number].node_id == 0) {
+        return ARB_ERR_NO_NODE_ID;
+    }
+    return ARB_ERR_CHANNEL;
 }
 
 /* 2307h: output channel, input channel [API 3.3.23]. Once started, the bus speaks through PDCP_EVENT_WISH. */
-static uint8_t configure_link(arb_call_t *call)
+uint8_t arb_hostbus_configure_link(arb_call_t *call)
 {
-    const arb_turn_t *turn = call->turn;
-    if (turn->started) {
+    if (call->api->turn.started) {
+        const uint8_t error = arb_call_outcome(call);
         call->answer[0] = PDCP_LINK_ACTIVE;
         call->answer_len = 1;
-        return arb_call_outcome(call);
+        return error;
     }
-    if (arb_call_device(call, &call->payload[0]) == PDCP_NONE ||
-        arb_call_device(call, &call->payload[7]) == PDCP_NONE) {
-        return ARB_ERR_DEVICE;
-    }
-    if (arb_call_is_busy(call)) {
-        return arb_call_wait_ready(call);
-    }
-    const uint8_t output = arb_call_channel(call, &call->payload[0], PDCP_OUTPUT);
-    const uint8_t input = arb_call_channel(call, &call->payload[7], PDCP_INPUT);
+    const uint8_t output = arb_call_channel(call, 0, PDCP_OUTPUT);
+    const uint8_t input = arb_call_channel(call, 1, PDCP_INPUT);
     if (output == PDCP_NONE || input == PDCP_NONE) {
-        return has_no_node_id(call, &call->payload[0]) ? ARB_ERR_NO_NODE_ID : ARB_ERR_CHANNEL;
+        return error_of_ends(call);
     }
-    if (breaks_sole_access(&call->arb->bus.nodes, output, input)) {
+    if (call->place[0] == call->place[1]) {
+        return ARB_ERR_VALUE;
+    }
+    if (breaks_sole_access(call, &call->arb->bus.nodes.channels[input])) {
         return ARB_ERR_SOLE_ACCESS;
     }
-    switch (pdcp_arb_connect(call->arb, output, input)) {
-    case PDCP_OK:
-        return arb_call_started_limited(call);
-    case PDCP_ERR_OWN:
-        return ARB_ERR_VALUE;
-    default:
-        return arb_call_wait_ready(call);
-    }
+    return pdcp_arb_connect(call->arb, output, input) == PDCP_OK ? arb_call_started(call)
+                                                                 : arb_call_wait_ready(call);
 }
 
 /* To all devices: Suspend (with its time) or Release only [PDCP 3.2.4, 3.2.5]. */
 static uint8_t broadcast(arb_call_t *call, uint8_t dlc, const uint8_t *data)
 {
-    const bool suspend = data[0] == PDCP_SUSPEND;
-    if (!suspend && data[0] != PDCP_RELEASE) {
+    if (data[0] != PDCP_SUSPEND && data[0] != PDCP_RELEASE) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    if (dlc != (suspend ? 3 : 1)) {
+    if (dlc != (data[0] == PDCP_SUSPEND ? 3 : 1)) {
         return ARB_ERR_VALUE;
     }
     if (call->arb->silent) {
         return ARB_ERR_NOT_READY;
     }
-    if (!pdcp_arb_broadcast(call->arb, data[0], suspend ? arb_host_get_u16(&data[1]) : 0)) {
+    if (!pdcp_arb_broadcast(call->arb, data[0], arb_host_get_u16(&data[1]))) { /* Release has no time */
         return ARB_ERR_BUSY;
     }
     call->api->handed = true;
@@ -251,143 +225,111 @@ static bool may_pass(uint8_t code)
 }
 
 /* 230Ah: dev, DLC, 8 data bytes [API 3.3.26]. Once started, the bus speaks through PDCP_EVENT_REQUEST. */
-static uint8_t passthrough(arb_call_t *call)
+uint8_t arb_hostbus_passthrough(arb_call_t *call)
 {
-    static const pdcp_identity_t all = {0, 0, 0};
-    const arb_turn_t *turn = call->turn;
-    if (turn->started) {
+    static const uint8_t all[6];
+    if (call->api->turn.started) {
         const uint8_t error = arb_call_outcome(call);
         if (error == ARB_PENDING) {
             return error; /* what is to be sent stands in the answer */
         }
-        call->answer[6] = (uint8_t)turn->value_len;
-        memset(&call->answer[7 + call->answer[6]], 0, 8u - call->answer[6]);
+        call->answer[6] = (uint8_t)call->answer_len;
+        memset(&call->answer[7 + call->answer_len], 0, 8u - call->answer_len);
         call->answer_len = PASSTHROUGH;
         return error;
     }
-    const pdcp_identity_t identity = arb_host_get_identity(call->payload);
     const uint8_t dlc = call->payload[6];
     const uint8_t *data = &call->payload[7];
     if (dlc == 0 || dlc > 8) {
         return ARB_ERR_SIZE;
     }
     memcpy(call->answer, call->payload, PASSTHROUGH);
-    if (pdcp_identity_equal(&identity, &all)) {
+    if (memcmp(call->payload, all, sizeof all) == 0) {
         return broadcast(call, dlc, data);
     }
-    const uint8_t place = arb_call_device(call, call->payload);
-    if (place == PDCP_NONE) {
+    call->place[0] = arb_call_device(call, call->payload);
+    if (call->place[0] == PDCP_NONE) {
         return ARB_ERR_DEVICE;
     }
     if (!may_pass(data[0]) ||
-        (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, place, data[2], data[1]))) {
+        (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, data[2], data[1]))) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    const pdcp_status_t status = pdcp_arb_passthrough(call->arb, place, &call->answer[7], dlc);
-    return status == PDCP_OK ? arb_call_started_limited(call) : (uint8_t)ARB_ERR_BUSY;
+    const pdcp_status_t status = pdcp_arb_passthrough(call->arb, call->place[0], &call->answer[7], dlc);
+    return status == PDCP_OK ? arb_call_started(call) : (uint8_t)ARB_ERR_BUSY;
 }
 
-static void start_resets(arb_call_t *call, uint8_t number)
+static void start_resets(arb_call_t *call, uint8_t first, uint8_t last)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    uint8_t rank = 0;
+    arb_turn_t *turn = &call->api->turn;
+    for (uint8_t number = first; number <= last; number++) {
+        const uint8_t place = pdcp_nodes_nth_device(&call->arb->bus.nodes, number);
+        profile_set_bit(turn->asked, place, true);
+        turn->open++;
+        (void)pdcp_arb_reset(call->arb, call->now_ms, place);
+    }
+}
+
+/* Devices have the numbers that they had when the request came, and only those that were reset have their
+ * bit. */
+static void put_results(arb_call_t *call)
+{
+    const arb_turn_t *turn = &call->api->turn;
+    uint8_t number = call->payload[0] == 0 ? 0 : (uint8_t)(call->payload[0] - 1);
+    memset(call->answer, 0, ARB_RESET_RESULTS);
+    call->answer_len = ARB_RESET_RESULTS;
     for (uint8_t place = 0; place < PDCP_DEVICES_MAX; place++) {
-        if (!pdcp_nodes_device_counts(&nodes->nodes[place])) {
-            continue;
-        }
-        rank++;
-        if (number == 0 || number == rank) {
-            profile_set_bit(call->turn->asked, place, true);
-            call->turn->open++;
-            (void)pdcp_arb_reset(call->arb, call->now_ms, place);
+        if (profile_bit(turn->asked, place)) {
+            profile_set_bit(call->answer, number, profile_bit(turn->reset, place));
+            number++;
         }
     }
 }
 
 /* 230Dh: 0 for all devices, else the number of one [API 3.3.29]. The bus speaks through PDCP_EVENT_RESET,
  * once for each. A device that is busy otherwise for too long is not reset. */
-static uint8_t reset(arb_call_t *call)
+uint8_t arb_hostbus_reset(arb_call_t *call)
 {
-    arb_turn_t *turn = call->turn;
+    const arb_turn_t *turn = &call->api->turn;
     if (!turn->started) {
-        if (call->payload[0] > pdcp_nodes_count_devices(&call->arb->bus.nodes)) {
+        const uint8_t count = pdcp_nodes_count_devices(&call->arb->bus.nodes);
+        const uint8_t number = call->payload[0];
+        if (number > count) {
             return ARB_ERR_NUMBER;
         }
         (void)arb_call_started(call);
-        start_resets(call, call->payload[0]);
-        (void)arb_call_wait(call, PDCP_HOST_WAIT_MS);
+        start_resets(call, number == 0 ? 1 : number, number == 0 ? count : number);
     }
-    if (turn->waiting && pdcp_time_reached(call->now_ms, turn->until_ms)) {
-        turn->waiting = false;
+    if (!arb_call_wait(call, PDCP_HOST_WAIT_MS)) {
         pdcp_arb_withdraw_resets(call->arb, call->now_ms);
     }
     if (turn->open != 0) {
         return ARB_PENDING;
     }
-    return memcmp(turn->asked, turn->reset, sizeof turn->asked) == 0 ? ARB_OK : ARB_ERR_NO_ANSWER;
+    if (memcmp(turn->asked, turn->reset, sizeof turn->asked) == 0) {
+        return ARB_OK;
+    }
+    put_results(call);
+    return ARB_ERR_NO_ANSWER;
 }
 
-/* Devices have the numbers that they had when the request came, and only those that were reset have their
- * bit. */
-void arb_hostbus_reset_results(const arb_call_t *call, uint8_t *results)
+/* Wishes and links may also be the planner's; the other events come only of what the host has asked for. */
+void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event)
 {
-    const arb_turn_t *turn = call->turn;
-    uint8_t number = call->payload[0] == 0 ? 0 : (uint8_t)(call->payload[0] - 1);
-    for (uint8_t place = 0; place < PDCP_DEVICES_MAX; place++) {
-        if (profile_bit(turn->asked, place)) {
-            if (profile_bit(turn->reset, place)) {
-                profile_set_bit(results, number, true);
-            }
-            number++;
-        }
-    }
-}
-
-static void on_reset(arb_turn_t *turn, const pdcp_event_t *event)
-{
-    if (event->kind == PDCP_EVENT_SILENT) {
-        turn->open = 0; /* all devices are forgotten */
-    }
-    if (event->kind != PDCP_EVENT_RESET || turn->open == 0) {
-        return;
-    }
-    turn->open--;
-    if (event->status == PDCP_OK) {
-        profile_set_bit(turn->reset, event->node, true);
-    }
-}
-
-void arb_hostbus_on_event(arb_turn_t *turn, uint16_t id, const pdcp_event_t *event)
-{
-    const bool is_link = id == ARB_MSG_CONFIGURE_LINK;
-    if (id == ARB_MSG_RESET) {
-        on_reset(turn, event);
-    } else if (id == ARB_MSG_REMOVE_LINK) {
-        if (event->kind == PDCP_EVENT_LINK && event->channel == turn->channel) {
-            turn->status = event->status;
-        }
-    } else if (event->kind == (is_link ? PDCP_EVENT_WISH : PDCP_EVENT_REQUEST)) {
+    arb_turn_t *turn = &api->turn;
+    const uint16_t id = api->held[0].id;
+    if (event->kind == PDCP_EVENT_REQUEST ||
+        (event->kind == PDCP_EVENT_WISH && id == ARB_MSG_CONFIGURE_LINK)) {
         turn->ended = true;
         turn->status = event->status;
         turn->value_len = event->len;
+    } else if (event->kind == PDCP_EVENT_LINK && id == ARB_MSG_REMOVE_LINK &&
+               event->channel == turn->channel) {
+        turn->status = event->status;
+    } else if (event->kind == PDCP_EVENT_RESET) {
+        turn->open--;
+        profile_set_bit(turn->reset, event->node, event->status == PDCP_OK);
+    } else if (event->kind == PDCP_EVENT_SILENT) {
+        turn->open = 0; /* all devices are forgotten */
     }
-}
-
-/* [API 3.2]; sizes without CRC16. */
-static const arb_message_t messages[] = {
-    {ARB_MSG_SYSTEM_INFO, 0, 0, system_info},
-    {ARB_MSG_DEVICE_INFO, 1, 1, device_info},
-    {ARB_MSG_INPUT_INFO, 1, 1, input_info},
-    {ARB_MSG_OUTPUT_INFO, 1, 1, output_info},
-    {ARB_MSG_LINK_INFO, 1, 1, link_info},
-    {ARB_MSG_GET_PARAMETER, 8, 8, get_parameter},
-    {ARB_MSG_SET_PARAMETER, 9, ARB_HOST_REQUEST_MAX, set_parameter},
-    {ARB_MSG_CONFIGURE_LINK, 14, 14, configure_link},
-    {ARB_MSG_PASSTHROUGH, PASSTHROUGH, PASSTHROUGH, passthrough},
-    {ARB_MSG_RESET, 1, 1, reset},
-};
-
-const arb_message_t *arb_hostbus_find(uint16_t id)
-{
-    return arb_call_find(messages, sizeof messages / sizeof messages[0], id);
 }

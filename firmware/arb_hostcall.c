@@ -1,66 +1,34 @@
 #include "arb_hostcall.h"
 
-#include <stddef.h>
-
 #include "pdcp_time.h"
-
-const arb_message_t *arb_call_find(const arb_message_t *messages, uint8_t count, uint16_t id)
-{
-    for (uint8_t i = 0; i < count; i++) {
-        if (messages[i].id == id) {
-            return &messages[i];
-        }
-    }
-    return NULL;
-}
+#include "profile_match.h"
 
 uint8_t arb_call_started(arb_call_t *call)
 {
-    call->turn->started = true;
-    call->turn->waiting = false;
+    call->api->turn.started = true;
     call->api->handed = true;
     return ARB_PENDING;
 }
 
 bool arb_call_wait(arb_call_t *call, uint16_t limit_ms)
 {
-    arb_turn_t *turn = call->turn;
-    if (!turn->waiting) {
-        turn->waiting = true;
-        turn->until_ms = call->now_ms + limit_ms;
+    arb_turn_t *turn = &call->api->turn;
+    const uint32_t until_ms = turn->since_ms + limit_ms;
+    if (pdcp_time_reached(call->now_ms, until_ms)) {
+        return false;
     }
-    return !pdcp_time_reached(call->now_ms, turn->until_ms);
-}
-
-uint8_t arb_call_again(arb_call_t *call)
-{
-    call->turn->waiting = true;
-    call->turn->until_ms = call->now_ms;
-    return ARB_PENDING;
-}
-
-uint8_t arb_call_started_limited(arb_call_t *call)
-{
-    arb_turn_t *turn = call->turn;
-    const uint32_t first_ms = turn->waiting ? turn->until_ms - ARB_HOST_NOT_READY_MS : call->now_ms;
-    (void)arb_call_started(call);
-    turn->waiting = true;
-    turn->until_ms = first_ms + ARB_HOST_ANSWER_MS;
-    return ARB_PENDING;
+    turn->until_ms = until_ms;
+    return true;
 }
 
 uint8_t arb_call_outcome(arb_call_t *call)
 {
-    const arb_turn_t *turn = call->turn;
-    if (!turn->ended && !arb_call_wait(call, 0)) {
+    const arb_turn_t *turn = &call->api->turn;
+    if (!turn->ended && !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
         pdcp_arb_give_up(call->arb, call->now_ms); /* its event ends the turn */
     }
+    call->answer_len = turn->value_len;
     return turn->ended ? arb_call_error(turn->status) : (uint8_t)ARB_PENDING;
-}
-
-bool arb_call_is_busy(const arb_call_t *call)
-{
-    return pdcp_arb_setup_running(call->arb) || arb_limb_is_busy(call->env->limb);
 }
 
 uint8_t arb_call_wait_ready(arb_call_t *call)
@@ -73,18 +41,17 @@ uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
     const pdcp_identity_t identity = arb_host_get_identity(bytes);
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t place = pdcp_nodes_find(nodes, &identity);
-    return place != PDCP_NONE && nodes->nodes[place].state != PDCP_NODE_LOST ? place : PDCP_NONE;
-}
-
-uint8_t arb_call_channel(const arb_call_t *call, const uint8_t *bytes, uint8_t transfer)
-{
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t place = arb_call_device(call, bytes);
-    if (place == PDCP_NONE || nodes->nodes[place].state != PDCP_NODE_READY) {
+    if (place != PDCP_NONE && nodes->nodes[place].state == PDCP_NODE_LOST) {
         return PDCP_NONE;
     }
-    const uint8_t number = pdcp_nodes_channel(nodes, place, bytes[6]);
-    return number != PDCP_NONE && nodes->channels[number].transfer == transfer ? number : PDCP_NONE;
+    return place;
+}
+
+uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
+{
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[end], call->payload[7 * end + 6]);
+    return profile_is_ready(nodes, number, transfer) ? number : PDCP_NONE;
 }
 
 uint8_t arb_call_error(int8_t status)

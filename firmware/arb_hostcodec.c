@@ -17,10 +17,11 @@ static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 
 uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
 {
-    static const uint8_t covered[] = {2, 3, 4, 6, 7};
     uint8_t crc = 0;
-    for (size_t i = 0; i < sizeof covered; i++) {
-        crc = crc8_byte(crc, header[covered[i]]);
+    for (size_t i = 2; i < ARB_HOST_HEADER; i++) {
+        if (i != 5) { /* where it stands itself */
+            crc = crc8_byte(crc, header[i]);
+        }
     }
     return crc;
 }
@@ -54,16 +55,12 @@ void arb_host_put_u16(uint8_t *bytes, uint16_t value)
 
 void arb_host_put_u32(uint8_t *bytes, uint32_t value)
 {
-    arb_host_put_u16(&bytes[0], (uint16_t)(value & 0xFFFFu));
-    arb_host_put_u16(&bytes[2], (uint16_t)(value >> 16));
-}
-
-void arb_host_decode_header(const uint8_t bytes[ARB_HOST_HEADER], arb_host_header_t *header)
-{
-    header->id = arb_host_get_u16(&bytes[2]);
-    header->reference = bytes[4];
-    header->crc8 = bytes[5];
-    header->size = arb_host_get_u16(&bytes[6]);
+    const uint16_t low = (uint16_t)(value & 0xFFFFu);
+    const uint16_t high = (uint16_t)(value >> 16);
+    bytes[0] = (uint8_t)(low & 0xFFu);
+    bytes[1] = (uint8_t)(low >> 8);
+    bytes[2] = (uint8_t)(high & 0xFFu);
+    bytes[3] = (uint8_t)(high >> 8);
 }
 
 uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)
@@ -100,4 +97,11 @@ void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uin
 {
     arb_host_put_identity(bytes, identity);
     bytes[6] = index;
+}
+
+void arb_host_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input)
+{
+    arb_host_put_channel(&bytes[0], &input->source, input->source_index);
+    arb_host_put_channel(&bytes[7], &nodes->nodes[input->node].identity, input->index);
+    bytes[14] = input->link;
 }

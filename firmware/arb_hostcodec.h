@@ -11,8 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_limits.h"
-#include "pdcp_spec.h"
+#include "pdcp_nodes.h"
 
 enum {
     ARB_HOST_SYNC1 = 0xFE,
@@ -70,20 +69,17 @@ enum {
     ARB_ERR_VALUE = 0x0F
 };
 
+/* A message on its way to the host. */
 typedef struct {
-    uint16_t id;
-    uint8_t reference;
-    uint8_t crc8;
-    uint16_t size; /* of payload and CRC16 together */
-} arb_host_header_t;
+    uint16_t len; /* of the whole message; 0: there is none */
+    uint16_t sent;
+} arb_out_t;
 
 /* Polynomial 07h, initial 00h, not reflected; over header bytes 2, 3, 4, 6, 7 (D-API-1). */
 uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER]);
 
 /* Polynomial 1021h, initial FFFFh, not reflected; over the payload (D-API-1). */
 uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len);
-
-void arb_host_decode_header(const uint8_t bytes[ARB_HOST_HEADER], arb_host_header_t *header);
 
 /* Completes a message whose payload of len bytes stands at frame + ARB_HOST_HEADER: writes header and CRC16.
  * Returns the length of the whole message. frame[] needs room for header, payload and CRC16. */
@@ -96,5 +92,8 @@ void arb_host_put_u16(uint8_t *bytes, uint16_t value);
 void arb_host_put_u32(uint8_t *bytes, uint32_t value);
 void arb_host_put_identity(uint8_t bytes[6], const pdcp_identity_t *identity);
 void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
+
+/* The link of an input as 220Eh and its event tell of it: output, input, status. */
+void arb_host_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input);
 
 #endif

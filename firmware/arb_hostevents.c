@@ -1,50 +1,36 @@
 #include "arb_hostevents.h"
 
+#include <stddef.h>
 #include <string.h>
 
-/* In the ring an event is its length, then what the message holds: kind, time, data. */
+/* In the queue an event is its length, then what the message holds: kind, time, data. */
 
-static void ring_put(arb_hostevents_t *events, uint8_t byte)
+/* Puts the beginning of an event into the queue. Returns where its len bytes of data go; NULL: it is not
+ * wanted, or finds no room. */
+static uint8_t *put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind, uint8_t len)
 {
-    events->ring[(events->first + events->used) % ARB_EVENT_RING] = byte;
-    events->used++;
-}
-
-static uint8_t ring_take(arb_hostevents_t *events)
-{
-    const uint8_t byte = events->ring[events->first];
-    events->first = (uint8_t)((events->first + 1) % ARB_EVENT_RING);
-    events->used--;
-    return byte;
-}
-
-static void put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind, const uint8_t *data,
-                uint8_t len)
-{
-    const uint8_t limit = kind == ARB_EVENT_FRAME ? ARB_EVENT_FRAMES : ARB_EVENT_RING;
+    const uint8_t limit = kind == ARB_EVENT_FRAME ? ARB_EVENT_FRAMES : ARB_EVENT_QUEUE;
+    uint8_t *bytes = &events->queue[events->used];
     if (!arb_hostevents_wants(events, kind)) {
-        return;
+        return NULL;
     }
-    if (1u + ARB_EVENT_HEAD + len + events->used > limit) {
-        events->dropped[kind - 1]++;
-        return;
+    if (events->used + 1 + ARB_EVENT_HEAD + len > limit) {
+        events->counters[kind]++;
+        return NULL;
     }
-    ring_put(events, (uint8_t)(ARB_EVENT_HEAD + len));
-    ring_put(events, (uint8_t)kind);
-    for (uint8_t shift = 0; shift < 32; shift = (uint8_t)(shift + 8)) {
-        ring_put(events, (uint8_t)((now_ms >> shift) & 0xFFu));
-    }
-    for (uint8_t i = 0; i < len; i++) {
-        ring_put(events, data[i]);
-    }
+    bytes[0] = (uint8_t)(ARB_EVENT_HEAD + len);
+    bytes[1] = (uint8_t)kind;
+    arb_host_put_u32(&bytes[2], now_ms);
+    events->used = (uint8_t)(events->used + 1 + bytes[0]);
+    return &bytes[1 + ARB_EVENT_HEAD];
 }
 
 void arb_hostevents_set_mask(arb_hostevents_t *events, uint8_t mask)
 {
     events->mask = mask;
-    if (events->message_len != 0 && events->message_sent == 0 &&
+    if (events->out.len != 0 && events->out.sent == 0 &&
         !arb_hostevents_wants(events, (arb_event_kind_t)events->message[ARB_HOST_HEADER])) {
-        events->message_len = 0;
+        events->out.len = 0;
     }
 }
 
@@ -52,39 +38,34 @@ void arb_hostevents_end(arb_hostevents_t *events)
 {
     events->mask = 0;
     events->used = 0;
-    events->message_len = 0;
-    events->message_sent = 0;
+    events->out.len = 0;
+    events->out.sent = 0;
 }
 
-static void put_device(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind,
-                       const pdcp_node_t *node)
+static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
+                       const pdcp_event_t *event)
 {
-    uint8_t data[7];
-    arb_host_put_channel(data, &node->identity, node->node_id);
-    put(events, now_ms, kind, data, sizeof data);
+    const pdcp_node_t *node = &arb->bus.nodes.nodes[event->node];
+    uint8_t *data =
+        put(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST, 7);
+    if (data != NULL) {
+        arb_host_put_channel(data, &node->identity, node->node_id);
+    }
 }
 
 /* An input whose link was taken away has no source any more: the job that has done it still knows. */
 static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t number)
 {
     const pdcp_channel_t *input = &arb->bus.nodes.channels[number];
-    const bool removed = input->link == PDCP_LINK_NONE && arb->bus.link.input == number &&
-                         arb->bus.link.kind == PDCP_TODO_REMOVE;
-    uint8_t data[ARB_EVENT_DATA_MAX];
-    if (removed) {
-        arb_host_put_channel(&data[0], &arb->bus.link.old_source, arb->bus.link.old_index);
-    } else {
-        arb_host_put_channel(&data[0], &input->source, input->source_index);
+    const pdcp_link_t *job = &arb->bus.link;
+    uint8_t *data = put(events, now_ms, ARB_EVENT_LINK, ARB_EVENT_DATA_MAX);
+    if (data == NULL) {
+        return;
     }
-    arb_host_put_channel(&data[7], &arb->bus.nodes.nodes[input->node].identity, input->index);
-    data[14] = input->link;
-    put(events, now_ms, ARB_EVENT_LINK, data, sizeof data);
-}
-
-static void put_state(arb_hostevents_t *events, uint32_t now_ms, arb_bus_state_t state)
-{
-    const uint8_t data[] = {(uint8_t)state, events->tx_errors, events->rx_errors};
-    put(events, now_ms, ARB_EVENT_BUS_STATE, data, sizeof data);
+    arb_host_put_link(data, &arb->bus.nodes, input);
+    if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
+        arb_host_put_channel(data, &job->old_source, job->old_index);
+    }
 }
 
 /* A bus that is not there at all counts as off; on standby the arbitrator is silent, however the bus is. */
@@ -96,70 +77,61 @@ static arb_bus_state_t state_of(const pdcp_arb_t *arb)
     return arb->recovery.state < PDCP_BUS_OFF ? (arb_bus_state_t)arb->recovery.state : ARB_BUS_OFF;
 }
 
+static void put_state(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms)
+{
+    uint8_t *data = put(events, now_ms, ARB_EVENT_BUS_STATE, 3);
+    if (data != NULL) {
+        data[0] = (uint8_t)state_of(arb);
+        data[1] = events->tx_errors;
+        data[2] = events->rx_errors;
+    }
+}
+
 void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                              const pdcp_event_t *event)
 {
-    if (events->mask == 0) {
-        return;
-    }
-    switch (event->kind) {
-    case PDCP_EVENT_BOUND:
-        put_device(events, now_ms, ARB_EVENT_BOUND, &arb->bus.nodes.nodes[event->node]);
-        break;
-    case PDCP_EVENT_LOST:
-        put_device(events, now_ms, ARB_EVENT_LOST, &arb->bus.nodes.nodes[event->node]);
-        break;
-    case PDCP_EVENT_LINK:
+    const pdcp_event_kind_t kind = event->kind;
+    if (kind == PDCP_EVENT_BOUND || kind == PDCP_EVENT_LOST) {
+        put_device(events, arb, now_ms, event);
+    } else if (kind == PDCP_EVENT_LINK) {
         put_link(events, arb, now_ms, event->channel);
-        break;
-    case PDCP_EVENT_STATE:
-    case PDCP_EVENT_SILENT:
-    case PDCP_EVENT_STARTED:
-        put_state(events, now_ms, state_of(arb));
-        break;
-    default:
-        break;
+    } else if (kind == PDCP_EVENT_STATE || kind == PDCP_EVENT_SILENT || kind == PDCP_EVENT_STARTED) {
+        put_state(events, arb, now_ms);
     }
 }
 
 void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const can_frame_t *frame)
 {
-    uint8_t data[3 + CAN_FRAME_DATA_MAX];
     if (frame->kind != CAN_FRAME_BASE || frame->dlc > CAN_FRAME_DATA_MAX) {
         return;
     }
-    arb_host_put_u16(&data[0], frame->id);
-    data[2] = frame->dlc;
-    memcpy(&data[3], frame->data, frame->dlc);
-    put(events, now_ms, ARB_EVENT_FRAME, data, (uint8_t)(3 + frame->dlc));
+    uint8_t *data = put(events, now_ms, ARB_EVENT_FRAME, (uint8_t)(3 + frame->dlc));
+    if (data != NULL) {
+        arb_host_put_u16(&data[0], frame->id);
+        data[2] = frame->dlc;
+        memcpy(&data[3], frame->data, frame->dlc);
+    }
 }
 
 void arb_hostevents_on_config(arb_hostevents_t *events, uint32_t now_ms, uint8_t active, uint8_t stored)
 {
-    const uint8_t data[] = {active, stored};
-    put(events, now_ms, ARB_EVENT_CONFIG, data, sizeof data);
+    uint8_t *data = put(events, now_ms, ARB_EVENT_CONFIG, 2);
+    if (data != NULL) {
+        data[0] = active;
+        data[1] = stored;
+    }
 }
 
 bool arb_hostevents_next(arb_hostevents_t *events)
 {
-    while (events->message_len == 0 && events->used != 0) {
-        const uint8_t len = ring_take(events);
-        for (uint8_t i = 0; i < len; i++) {
-            events->message[ARB_HOST_HEADER + i] = ring_take(events);
-        }
+    while (events->out.len == 0 && events->used != 0) {
+        const uint8_t len = events->queue[0];
+        memcpy(&events->message[ARB_HOST_HEADER], &events->queue[1], len);
+        events->used = (uint8_t)(events->used - 1 - len);
+        memmove(events->queue, &events->queue[1 + len], events->used);
         if (arb_hostevents_wants(events, (arb_event_kind_t)events->message[ARB_HOST_HEADER])) {
-            events->message_len = (uint8_t)arb_host_finish(events->message, ARB_MSG_EVENT, 0, len);
+            events->out.len = arb_host_finish(events->message, ARB_MSG_EVENT, 0, len);
         }
     }
-    return events->message_len != 0;
-}
-
-void arb_hostevents_taken(arb_hostevents_t *events, uint8_t count)
-{
-    events->message_sent = (uint8_t)(events->message_sent + count);
-    if (events->message_sent == events->message_len) {
-        events->message_len = 0;
-        events->message_sent = 0;
-        events->sent++;
-    }
+    return events->out.len != 0;
 }

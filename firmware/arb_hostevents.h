@@ -1,8 +1,8 @@
 /* The event stream to the host (2416h and 2419h, host-api.md 3): what happens on the bus, as messages that
  * nobody asked for. Nothing is sent to a host that has not asked for the stream.
  *
- * Events wait in a ring; one that finds no room is dropped and counted by its kind. CAN frames get no more
- * than a part of the ring, so that at full bus load the other kinds still find room. The answers to requests
+ * Events wait in a queue; one that finds no room is dropped and counted by its kind. CAN frames get no more
+ * than a part of the queue, so that at full bus load the other kinds still find room. The answers to requests
  * go first: arb_hostapi.c takes a message from here only when no answer waits, so that an answer never waits
  * for more than the rest of one message, 30 bytes. */
 #ifndef ARB_HOSTEVENTS_H
@@ -29,22 +29,19 @@ typedef enum { ARB_BUS_ACTIVE = 0, ARB_BUS_PASSIVE = 1, ARB_BUS_OFF = 2, ARB_BUS
 enum {
     ARB_EVENT_HEAD = 5,      /* kind8, time32 */
     ARB_EVENT_DATA_MAX = 15, /* a link */
-    ARB_EVENT_RING = 192,    /* bytes; 9 to 17 events */
-    ARB_EVENT_FRAMES = 64    /* bytes of the ring beyond which no CAN frame is taken */
+    ARB_EVENT_QUEUE = 192,   /* bytes; 9 to 17 events */
+    ARB_EVENT_FRAMES = 64    /* bytes of the queue beyond which no CAN frame is taken */
 };
 
 typedef struct {
     uint8_t mask;      /* bit k: kind k + 1 is wanted; 0: the stream is off */
     uint8_t tx_errors; /* of the controller, as told last */
     uint8_t rx_errors;
-    uint8_t first; /* byte of the ring where the oldest event begins */
-    uint8_t used;  /* bytes of the ring */
-    uint8_t ring[ARB_EVENT_RING];
+    uint8_t used;                           /* bytes of queue */
+    arb_out_t out;                          /* message */
+    uint32_t counters[1 + ARB_EVENT_KINDS]; /* 0: events sent; k: of kind k dropped for want of room */
     uint8_t message[ARB_HOST_HEADER + ARB_EVENT_HEAD + ARB_EVENT_DATA_MAX + ARB_HOST_CRC];
-    uint8_t message_len; /* of the message being sent; 0: none */
-    uint8_t message_sent;
-    uint32_t sent;
-    uint32_t dropped[ARB_EVENT_KINDS]; /* by kind, from kind 1 on */
+    uint8_t queue[ARB_EVENT_QUEUE]; /* events that wait, the oldest first */
 } arb_hostevents_t;
 
 /* Bits of the kinds that there are. */
@@ -71,17 +68,14 @@ void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const ca
 /* Another active configuration, or another number of stored ones. */
 void arb_hostevents_on_config(arb_hostevents_t *events, uint32_t now_ms, uint8_t active, uint8_t stored);
 
-/* Makes the oldest event the message being sent, if none is. True: message[] holds one, from message_sent on
+/* Makes the oldest event the message being sent, if none is. True: message[] holds one, and out says what of
  * it is still to be sent. */
 bool arb_hostevents_next(arb_hostevents_t *events);
-
-/* So many more bytes of the message were taken. */
-void arb_hostevents_taken(arb_hostevents_t *events, uint8_t count);
 
 /* Is something to be sent? */
 static inline bool arb_hostevents_wait(const arb_hostevents_t *events)
 {
-    return events->message_len != 0 || events->used != 0;
+    return events->out.len != 0 || events->used != 0;
 }
 
 #endif

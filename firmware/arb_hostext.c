@@ -1,20 +1,20 @@
 #include "arb_hostext.h"
 
+#include <string.h>
+
 #include "arb_hostcall.h"
 #include "arb_version.h"
+#include "profile_match.h"
 
 /* 2401h */
-static uint8_t arbitrator_info(arb_call_t *call)
+uint8_t arb_hostext_arbitrator_info(arb_call_t *call)
 {
+    static const uint8_t constants[] = {ARB_VERSION_PROTOCOL, ARB_VERSION_MAJOR, ARB_VERSION_MINOR,
+                                        ARB_VERSION_PATCH,    PDCP_DEVICES_MAX,  PDCP_CHANNELS_MAX,
+                                        PDCP_CHANNELS_MAX /* every input may have a link */};
     const arb_limb_t *limb = call->env->limb;
     uint8_t *answer = call->answer;
-    answer[0] = ARB_VERSION_PROTOCOL;
-    answer[1] = ARB_VERSION_MAJOR;
-    answer[2] = ARB_VERSION_MINOR;
-    answer[3] = ARB_VERSION_PATCH;
-    answer[4] = PDCP_DEVICES_MAX;
-    answer[5] = PDCP_CHANNELS_MAX;
-    answer[6] = PDCP_CHANNELS_MAX; /* every input may have a link */
+    memcpy(answer, constants, sizeof constants);
     answer[7] = arb_limb_state(limb);
     answer[8] = limb->active;
     answer[9] = limb->config.stored;
@@ -27,7 +27,7 @@ static uint8_t arbitrator_info(arb_call_t *call)
 }
 
 /* 2404h: flags; the event stream has a message of its own. */
-static uint8_t set_flags(arb_call_t *call)
+uint8_t arb_hostext_set_flags(arb_call_t *call)
 {
     const uint8_t flags = call->payload[0];
     if ((flags & ~(ARB_FLAGS_STORED | ARB_FLAG_EVENTS)) != 0) {
@@ -40,48 +40,44 @@ static uint8_t set_flags(arb_call_t *call)
 }
 
 /* 2407h: action, argument. One that takes too long goes on without the host. */
-static uint8_t action(arb_call_t *call)
+uint8_t arb_hostext_action(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
     uint8_t error;
     uint16_t result;
-    if (call->turn->started) {
+    if (call->api->turn.started) {
         if (!arb_limb_take_outcome(limb, &error, &result)) {
-            return arb_call_wait(call, 0) ? ARB_PENDING : ARB_ERR_BUSY;
+            return arb_call_wait(call, ARB_HOST_ANSWER_MS) ? ARB_PENDING : ARB_ERR_BUSY;
         }
         arb_host_put_u16(call->answer, result);
         call->answer_len = 2;
         return error;
     }
-    if (arb_call_is_busy(call) || arb_limb_is_starting(limb, call->arb)) {
+    if (arb_limb_is_starting(limb, call->arb)) {
         return arb_call_wait_ready(call);
     }
     error = arb_limb_act(limb, call->arb, call->now_ms, call->payload[0], call->payload[1]);
     if (error == ARB_ERR_BUSY) {
         return arb_call_wait_ready(call);
     }
-    return error == ARB_OK ? arb_call_started_limited(call) : error;
+    return error == ARB_OK ? arb_call_started(call) : error;
 }
 
 static uint8_t error_of_config(arb_call_t *call, int8_t status)
 {
-    switch (status) {
-    case ARB_CONFIG_OK:
-    case ARB_CONFIG_UNCHANGED:
-        return ARB_OK;
-    case ARB_CONFIG_ERR_BUSY: /* a plan reads or saves */
+    if (status == ARB_CONFIG_ERR_BUSY) { /* a plan reads or saves */
         return arb_call_wait(call, ARB_HOST_NOT_READY_MS) ? ARB_PENDING : ARB_ERR_BUSY;
-    case ARB_CONFIG_ERR_VALUE:
-        return ARB_ERR_VALUE;
-    default:
-        return ARB_ERR_STORAGE;
     }
+    if (status == ARB_CONFIG_ERR_VALUE) {
+        return ARB_ERR_VALUE;
+    }
+    return status >= 0 ? ARB_OK : ARB_ERR_STORAGE;
 }
 
 /* 240Ah: offset, length. Read in pieces, a step each: the bus goes on between them. */
-static uint8_t read_configs(arb_call_t *call)
+uint8_t arb_hostext_read_configs(arb_call_t *call)
 {
-    arb_turn_t *turn = call->turn;
+    arb_turn_t *turn = &call->api->turn;
     arb_config_t *config = &call->env->limb->config;
     const uint16_t offset = arb_host_get_u16(&call->payload[0]);
     const uint8_t len = call->payload[2];
@@ -94,14 +90,15 @@ static uint8_t read_configs(arb_call_t *call)
                             &call->answer[4 + turn->value_len], &piece);
     if (status == ARB_CONFIG_ERR_BUSY && turn->value_len != 0) { /* it may become another string */
         turn->value_len = 0;
-        turn->waiting = false;
+        turn->since_ms = call->now_ms;
     }
     if (status != ARB_CONFIG_OK) {
         return error_of_config(call, (int8_t)status);
     }
     turn->value_len = (uint16_t)(turn->value_len + piece);
     if (piece == ARB_CONFIG_READ_MAX && turn->value_len < len) {
-        return arb_call_again(call);
+        turn->until_ms = call->now_ms; /* called again with the next step, which is due at once */
+        return ARB_PENDING;
     }
     arb_host_put_u16(&call->answer[0], arb_config_length(config));
     arb_host_put_u16(&call->answer[2], offset);
@@ -118,10 +115,10 @@ static void on_piece_written(void *ctx, arb_config_status_t status)
 
 /* 240Dh: offset, total length, bytes. Each piece is a job of the storage, the last one that of the whole
  * string. */
-static uint8_t write_configs(arb_call_t *call)
+uint8_t arb_hostext_write_configs(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
-    arb_turn_t *turn = call->turn;
+    arb_turn_t *turn = &call->api->turn;
     const uint16_t offset = arb_host_get_u16(&call->payload[0]);
     const uint16_t total = arb_host_get_u16(&call->payload[2]);
     const uint16_t len = (uint16_t)(call->len - 4);
@@ -133,70 +130,64 @@ static uint8_t write_configs(arb_call_t *call)
     if (!turn->ended) {
         return ARB_PENDING;
     }
-    if (turn->status >= 0 && offset + (uint32_t)len == total) {
+    if (turn->status >= 0 && (uint16_t)(total - offset) == len) {
         arb_limb_on_written(limb, call->arb);
     }
     return error_of_config(call, turn->status);
 }
 
 /* 2410h: input channel. The outcome is seen in the tables: a job before it may tell of the same link. */
-static uint8_t remove_link(arb_call_t *call)
+uint8_t arb_hostext_remove_link(arb_call_t *call)
 {
-    arb_turn_t *turn = call->turn;
-    const pdcp_channel_t *channels = call->arb->bus.nodes.channels;
-    const uint8_t input = arb_call_channel(call, call->payload, PDCP_INPUT);
+    arb_turn_t *turn = &call->api->turn;
+    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (turn->started) {
-        if (input == PDCP_NONE || !arb_call_wait(call, 0)) {
+        if (!profile_is_ready(nodes, turn->channel, PDCP_INPUT) || !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
             return ARB_ERR_NO_ANSWER;
         }
-        return channels[input].link == PDCP_LINK_NONE ? arb_call_error(turn->status) : ARB_PENDING;
+        return nodes->channels[turn->channel].link == PDCP_LINK_NONE ? arb_call_error(turn->status)
+                                                                     : ARB_PENDING;
     }
-    if (arb_call_device(call, call->payload) == PDCP_NONE) {
-        return ARB_ERR_DEVICE;
-    }
-    if (arb_call_is_busy(call)) {
-        return arb_call_wait_ready(call);
-    }
-    if (input == PDCP_NONE) {
+    turn->channel = arb_call_channel(call, 0, PDCP_INPUT);
+    if (turn->channel == PDCP_NONE) {
         return ARB_ERR_CHANNEL;
     }
-    if (!pdcp_arb_disconnect(call->arb, input)) {
+    if (!pdcp_arb_disconnect(call->arb, turn->channel)) {
         return ARB_OK; /* like a link that is made twice */
     }
-    turn->channel = input;
-    return arb_call_started_limited(call);
-}
-
-static void put_counter(arb_call_t *call, uint32_t value)
-{
-    arb_host_put_u32(&call->answer[call->answer_len], value);
-    call->answer_len = (uint16_t)(call->answer_len + 4);
+    return arb_call_started(call);
 }
 
 static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count)
 {
     for (uint8_t i = 0; i < count; i++) {
-        put_counter(call, values[i]);
+        arb_host_put_u32(&call->answer[call->answer_len], values[i]);
+        call->answer_len = (uint16_t)(call->answer_len + 4);
     }
 }
 
-static void put_host_counters(arb_call_t *call)
+static void put_driver_counters(arb_call_t *call)
 {
-    const arb_hostapi_t *api = call->api;
-    const uint32_t values[] = {
-        api->received,     api->sent,         api->requests,      api->rx.garbage,
-        api->rx.bad_sizes, api->rx.bad_crc8s, api->rx.bad_crc16s, api->rx.given_up,
-        api->busy,         api->unknown,      api->events.sent,
-    };
-    put_counters(call, values, sizeof values / sizeof values[0]);
-    put_counters(call, api->events.dropped, ARB_EVENT_KINDS);
+    const arb_port_t *port = call->env->port;
+    for (uint8_t i = 0; i < (uint8_t)ARB_PORT_COUNTERS; i++) {
+        const uint32_t value = port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0;
+        put_counters(call, &value, 1);
+    }
 }
 
-/* 2413h: group. */
-static uint8_t statistics(arb_call_t *call)
+static void put_storage_counters(arb_call_t *call)
 {
     const arb_store_t *store = call->env->store;
     const arb_limb_t *limb = call->env->limb;
+    const uint32_t values[] = {store->failures, store->damaged, limb->flags.failures, limb->flags.damaged};
+    put_counters(call, values, 4);
+    put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
+}
+
+/* 2413h: group. */
+uint8_t arb_hostext_statistics(arb_call_t *call)
+{
+    const arb_hostapi_t *api = call->api;
     call->answer[0] = call->payload[0];
     call->answer_len = 1;
     switch (call->payload[0]) {
@@ -204,14 +195,16 @@ static uint8_t statistics(arb_call_t *call)
         put_counters(call, call->arb->bus.stats, PDCP_STAT_COUNT);
         return ARB_OK;
     case ARB_STATS_HOST:
-        put_host_counters(call);
+        put_counters(call, &api->counters[ARB_HOSTAPI_RECEIVED], 3);
+        put_counters(call, api->rx.counters, ARB_HOSTRX_COUNTERS);
+        put_counters(call, &api->counters[ARB_HOSTAPI_BUSY], 2);
+        put_counters(call, api->events.counters, 1 + ARB_EVENT_KINDS);
         return ARB_OK;
     case ARB_STATS_STORAGE:
-        put_counter(call, store->failures);
-        put_counter(call, store->damaged);
-        put_counter(call, limb->flags.failures);
-        put_counter(call, limb->flags.damaged);
-        put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
+        put_storage_counters(call);
+        return ARB_OK;
+    case ARB_STATS_DRIVERS:
+        put_driver_counters(call);
         return ARB_OK;
     default:
         return ARB_ERR_NUMBER;
@@ -219,7 +212,7 @@ static uint8_t statistics(arb_call_t *call)
 }
 
 /* 2416h: mask. */
-static uint8_t event_stream(arb_call_t *call)
+uint8_t arb_hostext_event_stream(arb_call_t *call)
 {
     const uint8_t mask = call->payload[0];
     if ((mask & ~ARB_EVENT_MASK) != 0) {
@@ -227,21 +220,4 @@ static uint8_t event_stream(arb_call_t *call)
     }
     arb_hostevents_set_mask(&call->api->events, mask);
     return ARB_OK;
-}
-
-/* Sizes without CRC16. */
-static const arb_message_t messages[] = {
-    {ARB_MSG_ARBITRATOR_INFO, 0, 0, arbitrator_info},
-    {ARB_MSG_SET_FLAGS, 1, 1, set_flags},
-    {ARB_MSG_ACTION, 2, 2, action},
-    {ARB_MSG_READ_CONFIGS, 3, 3, read_configs},
-    {ARB_MSG_WRITE_CONFIGS, 5, ARB_HOST_REQUEST_MAX, write_configs},
-    {ARB_MSG_REMOVE_LINK, 7, 7, remove_link},
-    {ARB_MSG_STATISTICS, 1, 1, statistics},
-    {ARB_MSG_EVENT_STREAM, 1, 1, event_stream},
-};
-
-const arb_message_t *arb_hostext_find(uint16_t id)
-{
-    return arb_call_find(messages, sizeof messages / sizeof messages[0], id);
 }

@@ -9,166 +9,151 @@ void arb_hostrx_init(arb_hostrx_t *rx)
     memset(rx, 0, sizeof *rx);
 }
 
-static void drop(arb_hostrx_t *rx, uint16_t count)
+/* Bytes like FE 19, or FE as the last one, are where a message may begin. Returns the next such place from at
+ * on; rx->len: there is none. */
+static uint16_t next_sync(const arb_hostrx_t *rx, uint16_t at)
 {
-    rx->len = (uint16_t)(rx->len - count);
-    memmove(rx->bytes, &rx->bytes[count], rx->len);
-}
-
-/* Gives the first count bytes up and goes to the next place where a message may begin. */
-static void hunt(arb_hostrx_t *rx, uint16_t count)
-{
-    while (count < rx->len) {
-        const bool sync1 = rx->bytes[count] == ARB_HOST_SYNC1;
-        const bool last = count + 1u == rx->len;
-        if (sync1 && (last || rx->bytes[count + 1u] == ARB_HOST_SYNC2)) {
+    for (; at < rx->len; at++) {
+        const uint8_t *bytes = &rx->bytes[at];
+        if (bytes[0] == ARB_HOST_SYNC1 && (at + 1u == rx->len || bytes[1] == ARB_HOST_SYNC2)) {
             break;
         }
-        count++;
     }
-    rx->garbage += count;
-    drop(rx, count);
+    return at;
 }
 
-static void drop_taken(arb_hostrx_t *rx)
+/* Drops what was taken, and goes on to the next place where a message may begin. */
+static void hunt(arb_hostrx_t *rx)
 {
-    if (rx->taken != 0) {
-        drop(rx, rx->taken);
+    const uint16_t at = next_sync(rx, rx->taken);
+    if (at != 0) {
+        rx->counters[ARB_HOSTRX_GARBAGE] += (uint16_t)(at - rx->taken);
+        rx->len = (uint16_t)(rx->len - at);
+        memmove(rx->bytes, &rx->bytes[at], rx->len);
         rx->taken = 0;
-        hunt(rx, 0);
     }
 }
 
 void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte)
 {
-    drop_taken(rx);
     rx->bytes[rx->len++] = byte;
     rx->last_ms = now_ms;
     rx->overdue = false;
-    if (rx->len <= 2) {
-        hunt(rx, 0);
-    }
 }
 
 void arb_hostrx_clear(arb_hostrx_t *rx)
 {
-    drop_taken(rx);
-    rx->garbage += rx->len;
+    hunt(rx);
+    rx->counters[ARB_HOSTRX_GARBAGE] += rx->len;
     rx->len = 0;
 }
 
-static bool crc8_matches(const arb_hostrx_t *rx, const arb_host_header_t *header)
+static bool crc8_matches(const uint8_t *header)
 {
-    return header->crc8 == arb_host_crc8(rx->bytes);
+    return header[5] == arb_host_crc8(header);
 }
 
-/* Are the checksums of the message at the front right? */
-static bool checksums_match(const arb_hostrx_t *rx, const arb_host_header_t *header)
+/* Bytes of the message at the front, as its header says. */
+static uint16_t front_total(const arb_hostrx_t *rx)
 {
-    const uint16_t payload = (uint16_t)(header->size - ARB_HOST_CRC);
-    return crc8_matches(rx, header) &&
-           (header->size == 0 || arb_host_get_u16(&rx->bytes[ARB_HOST_HEADER + payload]) ==
-                                     arb_host_crc16(&rx->bytes[ARB_HOST_HEADER], payload));
-}
-
-typedef enum { INSIDE_NOTHING, INSIDE_HEADER, INSIDE_DOUBTFUL } inside_t;
-
-/* Does another message begin inside the one at the front, of total bytes: a header with a right checksum,
- * whose end may stand behind total? Doubtful: there is the beginning of one, and it is not all here yet. */
-static inside_t look_inside(const arb_hostrx_t *rx, uint16_t total)
-{
-    for (uint16_t at = 1; at < total; at++) {
-        const uint8_t *bytes = &rx->bytes[at];
-        const uint16_t left = (uint16_t)(rx->len - at);
-        if (bytes[0] != ARB_HOST_SYNC1 || (left > 1 && bytes[1] != ARB_HOST_SYNC2)) {
-            continue;
-        }
-        if (left < ARB_HOST_HEADER) {
-            return INSIDE_DOUBTFUL;
-        }
-        if (bytes[5] == arb_host_crc8(bytes)) {
-            return INSIDE_HEADER;
-        }
-    }
-    return INSIDE_NOTHING;
-}
-
-static bool size_is_possible(uint16_t size)
-{
-    return size == 0 || (size > ARB_HOST_CRC && size <= ARB_HOST_REQUEST_MAX + ARB_HOST_CRC);
-}
-
-/* A header whose size cannot be. True: it is a set request with too long a value, which gets an answer
- * (D-API-7). */
-static bool give_up_size(arb_hostrx_t *rx, const arb_host_header_t *header, arb_hostrx_request_t *request)
-{
-    const bool too_long = header->id == ARB_MSG_SET_PARAMETER && header->size > ARB_HOST_CRC &&
-                          header->crc8 == arb_host_crc8(rx->bytes);
-    rx->bad_sizes++;
-    hunt(rx, 1);
-    request->too_long = too_long;
-    request->crc_ok = true;
-    return too_long;
-}
-
-static bool front_is_complete(const arb_hostrx_t *rx)
-{
-    arb_host_header_t header;
-    if (rx->len < ARB_HOST_HEADER) {
-        return false;
-    }
-    arb_host_decode_header(rx->bytes, &header);
-    return size_is_possible(header.size) && rx->len - ARB_HOST_HEADER >= header.size;
+    return (uint16_t)(ARB_HOST_HEADER + arb_host_get_u16(&rx->bytes[6]));
 }
 
 void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms)
 {
-    drop_taken(rx);
-    if (rx->len == 0 || !pdcp_time_reached(now_ms, rx->last_ms + ARB_HOSTRX_TIMEOUT_MS)) {
-        return;
+    rx->overdue = pdcp_time_reached(now_ms, rx->last_ms + ARB_HOSTRX_TIMEOUT_MS);
+}
+
+/* What stands at the front? */
+typedef enum {
+    FRONT_OPEN, /* the next bytes have to tell */
+    FRONT_MESSAGE,
+    FRONT_TOO_LONG, /* a header whose size cannot be, of a set request that gets an answer (D-API-7) */
+    FRONT_NOTHING
+} front_t;
+
+/* The message at the front, of total bytes, has a wrong checksum. Nothing: another message begins inside, a
+ * header with a right checksum, whose end may stand behind total. Open: the beginning of one, and it is not
+ * all here yet. */
+static front_t look_inside(const arb_hostrx_t *rx, uint16_t total)
+{
+    for (uint16_t at = next_sync(rx, 1); at < total; at = next_sync(rx, (uint16_t)(at + 1u))) {
+        if (rx->len - at < ARB_HOST_HEADER) {
+            return rx->overdue ? FRONT_MESSAGE : FRONT_OPEN;
+        }
+        if (crc8_matches(&rx->bytes[at])) {
+            return FRONT_NOTHING;
+        }
     }
-    rx->overdue = true;
-    if (!front_is_complete(rx)) {
-        rx->given_up++;
-        hunt(rx, 1);
+    return FRONT_MESSAGE;
+}
+
+static bool crc16_matches(const uint8_t *payload, uint16_t len)
+{
+    return len == 0 || arb_host_get_u16(&payload[len]) == arb_host_crc16(payload, len);
+}
+
+/* All of the message at the front is here. */
+static front_t check(arb_hostrx_t *rx, arb_hostrx_request_t *request)
+{
+    const bool crc8_ok = crc8_matches(rx->bytes);
+    if (crc8_ok && crc16_matches(&rx->bytes[ARB_HOST_HEADER], request->len)) {
+        return FRONT_MESSAGE;
     }
+    const front_t front = look_inside(rx, front_total(rx));
+    if (front != FRONT_OPEN) {
+        rx->counters[crc8_ok ? ARB_HOSTRX_BAD_CRC16S : ARB_HOSTRX_BAD_CRC8S]++;
+    }
+    request->error = ARB_ERR_CRC;
+    return front;
+}
+
+/* Fills in the request as far as it is here. */
+static front_t look_at_front(arb_hostrx_t *rx, arb_hostrx_request_t *request)
+{
+    const uint8_t *bytes = rx->bytes;
+    if (rx->len < ARB_HOST_HEADER) {
+        return FRONT_OPEN;
+    }
+    const uint16_t size = arb_host_get_u16(&bytes[6]);
+    request->id = arb_host_get_u16(&bytes[2]);
+    request->reference = bytes[4];
+    request->len = 0;
+    request->error = ARB_OK;
+    if (size != 0 && (size <= ARB_HOST_CRC || size > ARB_HOST_REQUEST_MAX + ARB_HOST_CRC)) {
+        rx->counters[ARB_HOSTRX_BAD_SIZES]++;
+        request->error = ARB_ERR_SIZE;
+        return request->id == ARB_MSG_SET_PARAMETER && size > ARB_HOST_CRC && crc8_matches(bytes)
+                   ? FRONT_TOO_LONG
+                   : FRONT_NOTHING;
+    }
+    if (size != 0) {
+        request->len = (uint16_t)(size - ARB_HOST_CRC);
+    }
+    return rx->len < ARB_HOST_HEADER + size ? FRONT_OPEN : check(rx, request);
 }
 
 bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
 {
-    drop_taken(rx);
-    while (rx->len >= ARB_HOST_HEADER) {
-        arb_host_header_t header;
-        arb_host_decode_header(rx->bytes, &header);
-        memset(request, 0, sizeof *request);
-        request->id = header.id;
-        request->reference = header.reference;
-        if (!size_is_possible(header.size)) {
-            if (give_up_size(rx, &header, request)) {
-                return true;
-            }
-            continue;
+    hunt(rx);
+    while (rx->len != 0) {
+        const front_t front = look_at_front(rx, request);
+        if (front == FRONT_MESSAGE) {
+            rx->taken = front_total(rx);
+            return true;
         }
-        const uint16_t total = (uint16_t)(ARB_HOST_HEADER + header.size);
-        if (rx->len < total) {
-            return false;
-        }
-        request->crc_ok = checksums_match(rx, &header);
-        if (!request->crc_ok) {
-            const inside_t inside = look_inside(rx, total);
-            if (inside == INSIDE_DOUBTFUL && !rx->overdue) {
+        if (front == FRONT_OPEN) {
+            if (!rx->overdue) {
                 return false;
             }
-            (*(crc8_matches(rx, &header) ? &rx->bad_crc16s : &rx->bad_crc8s))++;
-            if (inside == INSIDE_HEADER) {
-                hunt(rx, 1);
-                continue;
-            }
+            rx->counters[ARB_HOSTRX_GIVEN_UP]++;
         }
-        request->payload = &rx->bytes[ARB_HOST_HEADER];
-        request->len = header.size != 0 ? (uint16_t)(header.size - ARB_HOST_CRC) : 0;
-        rx->taken = total;
-        return true;
+        rx->counters[ARB_HOSTRX_GARBAGE]++;
+        rx->taken = 1;
+        hunt(rx);
+        if (front == FRONT_TOO_LONG) {
+            return true;
+        }
     }
     return false;
 }

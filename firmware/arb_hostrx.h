@@ -16,33 +16,37 @@
 /* Silence inside a message after which it is given up (D-API-2). */
 #define ARB_HOSTRX_TIMEOUT_MS 100
 
+/* What is counted, since the start; in the order of 2413h (arb_hostext.h). */
+typedef enum {
+    ARB_HOSTRX_GARBAGE,    /* bytes skipped */
+    ARB_HOSTRX_BAD_SIZES,  /* headers with an impossible size */
+    ARB_HOSTRX_BAD_CRC8S,  /* messages whose CRC8 did not match, accepted or not */
+    ARB_HOSTRX_BAD_CRC16S, /* and whose CRC8 did, but not the CRC16 */
+    ARB_HOSTRX_GIVEN_UP,   /* messages that stopped in the middle */
+    ARB_HOSTRX_COUNTERS
+} arb_hostrx_counter_t;
+
 typedef struct {
     uint16_t len;
-    bool overdue;        /* 100 ms without a byte: what is doubtful is decided now */
-    uint16_t taken;      /* bytes of the request handed out last; they go with the next call */
-    uint32_t last_ms;    /* of the last byte */
-    uint32_t garbage;    /* bytes skipped, since the start */
-    uint32_t bad_sizes;  /* headers with an impossible size */
-    uint32_t bad_crc8s;  /* messages whose CRC8 did not match, accepted or not */
-    uint32_t bad_crc16s; /* and whose CRC8 did, but not the CRC16 */
-    uint32_t given_up;   /* messages that stopped in the middle */
+    bool overdue;     /* 100 ms without a byte: what is doubtful is decided now */
+    uint16_t taken;   /* bytes of the request handed out last; they go with the next call */
+    uint32_t last_ms; /* of the last byte */
+    uint32_t counters[ARB_HOSTRX_COUNTERS];
     uint8_t bytes[2 * ARB_HOST_HEADER + ARB_HOST_REQUEST_MAX + ARB_HOST_CRC];
 } arb_hostrx_t;
 
-/* A request; payload points into the receiver and is valid until the next call. */
+/* A request. Its payload stands at rx->bytes[ARB_HOST_HEADER] until the next call. */
 typedef struct {
     uint16_t id;
+    uint16_t len; /* of the payload */
     uint8_t reference;
-    bool crc_ok;
-    bool too_long; /* a set request with matching CRC8 and a value beyond PDCP_PARAMETER_MAX: no payload
-                      (D-API-7) */
-    const uint8_t *payload;
-    uint16_t len;
+    uint8_t error; /* ARB_OK; ARB_ERR_CRC: a checksum does not match; ARB_ERR_SIZE: a set request with
+                      matching CRC8 and a value beyond PDCP_PARAMETER_MAX, no payload (D-API-7) */
 } arb_hostrx_request_t;
 
 void arb_hostrx_init(arb_hostrx_t *rx);
 
-/* Takes one byte. Then call arb_hostrx_next until it returns false. */
+/* Takes one byte. Then call arb_hostrx_next until it returns false, before the next byte. */
 void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte);
 
 /* Gives up a message that has been silent for too long. Then call arb_hostrx_next until it returns false. */

@@ -4,6 +4,9 @@
 #include <string.h>
 
 #include "pdcp_time.h"
+#include "profile_match.h"
+
+#define SCORE_BOTH 256u /* of a link that is there with both ends; with one end: 1 */
 
 /* What is under way. */
 typedef enum {
@@ -17,37 +20,30 @@ typedef enum {
     STAGE_PLAN /* a plan for the host is carried out */
 } stage_t;
 
-static void apply_flags(arb_limb_t *limb)
+static void apply_flags(arb_limb_t *limb, uint8_t flags)
 {
-    const uint8_t flags = arb_limb_flags(limb);
-    limb->run.autoconfigure = (flags & ARB_FLAG_AUTOCONFIGURE) != 0;
-    limb->run.hot_swap = (flags & ARB_FLAG_HOT_SWAP) != 0;
+    limb->in_force = flags & ARB_FLAGS_STORED;
+    limb->run.at_start = PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE;
+    if ((flags & ARB_FLAG_AUTOCONFIGURE) != 0) {
+        limb->run.at_start = PROFILE_PLAN_ALL;
+    }
+    limb->run.at_events = (flags & ARB_FLAG_HOT_SWAP) != 0 ? limb->run.at_start : PROFILE_PLAN_ORIGINALS;
 }
 
 void arb_limb_init(arb_limb_t *limb, arb_nvm_t *nvm, uint8_t flags_on, uint8_t flags_off, uint32_t now_ms)
 {
     memset(limb, 0, sizeof *limb);
-    limb->flags_on = flags_on;
-    limb->flags_off = flags_off;
     limb->told = true;
     profile_run_init(&limb->run, now_ms);
     arb_flags_load(&limb->flags, nvm);
     arb_config_init(&limb->config, nvm);
-    apply_flags(limb);
-}
-
-uint8_t arb_limb_flags(const arb_limb_t *limb)
-{
-    const uint8_t flags = arb_flags_get(&limb->flags);
-    return (uint8_t)((flags | limb->flags_on) & ~limb->flags_off & ARB_FLAGS_STORED);
+    apply_flags(limb, (uint8_t)((arb_flags_get(&limb->flags) | flags_on) & ~flags_off));
 }
 
 void arb_limb_set_flags(arb_limb_t *limb, uint32_t now_ms, uint8_t flags)
 {
-    limb->flags_on = 0; /* the host's word is the last one */
-    limb->flags_off = 0;
     arb_flags_set(&limb->flags, flags, now_ms);
-    apply_flags(limb);
+    apply_flags(limb, flags);
 }
 
 bool arb_limb_is_busy(const arb_limb_t *limb)
@@ -83,7 +79,6 @@ static void set_active(arb_limb_t *limb, uint8_t number)
 static void forget_active(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     set_active(limb, 0);
-    limb->run.stored = false;
     pdcp_arb_plan_links(arb, false);
 }
 
@@ -95,15 +90,12 @@ void arb_limb_on_written(arb_limb_t *limb, pdcp_arb_t *arb)
     }
 }
 
-static void end(arb_limb_t *limb, uint8_t error, uint16_t result)
+/* What was under way has ended. */
+static void end(arb_limb_t *limb, uint8_t error)
 {
     limb->stage = STAGE_IDLE;
-    if (limb->for_host) {
-        limb->ended = true;
-        limb->error = error;
-        limb->result = result;
-    }
-    limb->for_host = false;
+    limb->ended = true;
+    limb->error = error;
 }
 
 static uint8_t error_of(arb_config_status_t status)
@@ -123,78 +115,14 @@ static uint8_t error_of(arb_config_status_t status)
     }
 }
 
-/* --- Start-up: which stored configuration (D-PRO-4) --- */
-
-static bool is_present(const pdcp_nodes_t *nodes, const profile_end_t *end, uint8_t transfer)
+/* A job of arb_config was to be started for this stage. */
+static uint8_t started(arb_limb_t *limb, stage_t stage, arb_config_status_t status)
 {
-    const uint8_t place = pdcp_nodes_find(nodes, &end->owner);
-    if (place == PDCP_NONE || nodes->nodes[place].state != PDCP_NODE_READY) {
-        return false;
+    if (status == ARB_CONFIG_OK) {
+        limb->stage = (uint8_t)stage;
     }
-    const uint8_t channel = pdcp_nodes_channel(nodes, place, end->index);
-    return channel != PDCP_NONE && nodes->channels[channel].transfer == transfer;
+    return error_of(status);
 }
-
-/* Is the configuration just read better than the best one so far? */
-static void compare(arb_limb_t *limb)
-{
-    const bool matches = limb->both != 0 || limb->one != 0;
-    const bool first = limb->best == 0;
-    const bool better =
-        limb->both > limb->best_both ||
-        (limb->both == limb->best_both &&
-         (limb->one > limb->best_one || (limb->one == limb->best_one && limb->number < limb->best)));
-    if (limb->number != 0 && matches && (first || better)) {
-        limb->best = limb->number;
-        limb->best_both = limb->both;
-        limb->best_one = limb->one;
-    }
-}
-
-static void score_configuration(void *ctx, uint8_t number)
-{
-    arb_limb_t *limb = ctx;
-    compare(limb);
-    limb->number = number;
-    limb->both = 0;
-    limb->one = 0;
-}
-
-static void score_link(void *ctx, uint8_t number, const profile_link_t *link)
-{
-    arb_limb_t *limb = ctx;
-    const bool output = is_present(&limb->arb->bus.nodes, &link->output, PDCP_OUTPUT);
-    const bool input = is_present(&limb->arb->bus.nodes, &link->input, PDCP_INPUT);
-    (void)number;
-    if (output && input) {
-        limb->both++;
-    } else if (output || input) {
-        limb->one++;
-    }
-}
-
-static const profile_tlv_sink_t score_sink = {.on_configuration = score_configuration, .on_link = score_link};
-
-static void load_link(void *ctx, uint8_t number, const profile_link_t *link)
-{
-    arb_limb_t *limb = ctx;
-    if (number == limb->number && !profile_run_load_link(&limb->run, link)) {
-        limb->overflow = true;
-    }
-}
-
-static const profile_tlv_sink_t load_sink = {.on_link = load_link};
-
-static void count_link(void *ctx, uint8_t number, const profile_link_t *link)
-{
-    arb_limb_t *limb = ctx;
-    (void)link;
-    if (number == limb->number && limb->both < UINT8_MAX) {
-        limb->both++;
-    }
-}
-
-static const profile_tlv_sink_t count_sink = {.on_link = count_link};
 
 /* A job of arb_config has ended: what comes next begins with the next step. */
 static void on_done(void *ctx, arb_config_status_t status)
@@ -204,36 +132,83 @@ static void on_done(void *ctx, arb_config_status_t status)
     limb->status = (int8_t)status;
 }
 
-static bool read_all(arb_limb_t *limb, stage_t stage, const profile_tlv_sink_t *sink, uint32_t now_ms)
+/* --- Reading what is stored --- */
+
+static bool is_present(const pdcp_nodes_t *nodes, const profile_end_t *end, uint8_t transfer)
 {
-    if (arb_config_read(&limb->config, sink, on_done, limb, now_ms) != ARB_CONFIG_OK) {
-        return false;
-    }
-    limb->stage = (uint8_t)stage;
-    limb->done = false;
-    return true;
+    const uint8_t place = pdcp_nodes_find(nodes, &end->owner);
+    return place != PDCP_NONE &&
+           profile_is_ready(nodes, pdcp_nodes_channel(nodes, place, end->index), transfer);
 }
+
+/* Is the configuration just read better than the best one so far (D-PRO-4)? One without a link that has an
+ * end here never is. */
+static void compare(arb_limb_t *limb)
+{
+    if (limb->score > limb->best_score || (limb->score == limb->best_score && limb->number < limb->best)) {
+        limb->best = limb->number;
+        limb->best_score = limb->score;
+    }
+}
+
+static void score_link(arb_limb_t *limb, uint8_t number, const profile_link_t *link)
+{
+    const bool output = is_present(&limb->arb->bus.nodes, &link->output, PDCP_OUTPUT);
+    const bool input = is_present(&limb->arb->bus.nodes, &link->input, PDCP_INPUT);
+    if (number != limb->number) {
+        compare(limb);
+        limb->number = number;
+        limb->score = 0;
+    }
+    if (output && input) {
+        limb->score = (uint16_t)(limb->score + SCORE_BOTH);
+    } else if (output || input) {
+        limb->score++;
+    }
+}
+
+static void on_link(void *ctx, uint8_t number, const profile_link_t *link)
+{
+    arb_limb_t *limb = ctx;
+    if (limb->stage == STAGE_SCORE) {
+        score_link(limb, number, link);
+    } else if (number != limb->number) {
+        return;
+    } else if (limb->stage == STAGE_CHECK) {
+        limb->score++;
+    } else if (!profile_run_load_link(&limb->run, link)) {
+        limb->error = ARB_ERR_STORAGE; /* of the load; the link is left out */
+    }
+}
+
+static uint8_t read_all(arb_limb_t *limb, stage_t stage, uint32_t now_ms)
+{
+    static const profile_tlv_sink_t sink = {.on_link = on_link};
+    return started(limb, stage, arb_config_read(&limb->config, &sink, on_done, limb, now_ms));
+}
+
+/* --- Start-up: which stored configuration (D-PRO-4) --- */
 
 static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
 {
     limb->stage = STAGE_IDLE;
     set_active(limb, number);
     profile_run_start(&limb->run, arb, number != 0);
-    (void)profile_run_take_change(&limb->run); /* what was loaded or read back is not a change to be saved */
+    limb->run.changed = false; /* what was loaded or read back is not a change to be saved */
 }
 
 /* The bus is quiet: the start-up begins. */
 static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
 {
+    limb->arb = arb;
     limb->best = 0;
+    limb->best_score = 0;
     limb->number = 0;
-    limb->both = 0;
-    limb->one = 0;
+    limb->score = 0;
     if (limb->config.stored == 0) {
         start(limb, arb, 0);
     } else {
-        (void)read_all(limb, STAGE_SCORE, &score_sink,
-                       now_ms); /* refused while busy: again with the next step */
+        (void)read_all(limb, STAGE_SCORE, now_ms); /* refused while busy: again with the next step */
     }
 }
 
@@ -243,8 +218,7 @@ static void end_score(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
     compare(limb);
     profile_run_load_begin(&limb->run, true);
     limb->number = limb->best;
-    if (limb->status != ARB_CONFIG_OK || limb->best == 0 ||
-        !read_all(limb, STAGE_START, &load_sink, now_ms)) {
+    if (limb->status != ARB_CONFIG_OK || limb->best == 0 || read_all(limb, STAGE_START, now_ms) != ARB_OK) {
         start(limb, arb, 0);
     }
 }
@@ -267,94 +241,70 @@ static void get_link(void *ctx, uint8_t k, profile_link_t *link)
     profile_links_get(&limb->run.links, k, link);
 }
 
-static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t argument)
+static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    if (!profile_run_is_complete(&limb->run, arb)) {
+    if (!profile_run_take_up(&limb->run, arb)) {
         return ARB_ERR_STORAGE;
     }
-    limb->number = argument != 0 ? argument : limb->active;
     const arb_config_status_t status =
         arb_config_save(&limb->config, &limb->number, limb->run.links.count, get_link, on_done, limb, now_ms);
-    if (status != ARB_CONFIG_OK) {
-        return error_of(status);
+    if (status == ARB_CONFIG_OK) {
+        limb->run.frozen = true;
     }
-    limb->stage = STAGE_SAVE;
-    limb->done = false;
-    profile_run_freeze(&limb->run, arb, true);
-    return ARB_OK;
+    return started(limb, STAGE_SAVE, status);
 }
 
 static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
 {
-    profile_run_freeze(&limb->run, arb, false);
-    if (limb->status < 0) {
-        end(limb, error_of((arb_config_status_t)limb->status), 0);
-        return;
+    limb->run.frozen = false;
+    (void)profile_run_take_up(&limb->run, arb);
+    if (limb->status >= 0) {
+        limb->unsaved = false;
+        pdcp_arb_plan_links(arb, true);
+        set_active(limb, limb->number);
     }
-    limb->unsaved = false;
-    limb->run.stored = true;
-    pdcp_arb_plan_links(arb, true);
-    set_active(limb, limb->number);
-    end(limb, ARB_OK, 0);
+    end(limb, error_of((arb_config_status_t)limb->status));
 }
 
-static uint8_t begin_load(arb_limb_t *limb, uint32_t now_ms, uint8_t argument)
+static uint8_t begin_load(arb_limb_t *limb, uint32_t now_ms)
 {
-    const uint8_t number = argument != 0 ? argument : limb->active;
-    if (number == 0 || !arb_config_has(&limb->config, number)) {
-        return ARB_ERR_NUMBER;
-    }
-    limb->number = number;
-    limb->both = 0;
-    return read_all(limb, STAGE_CHECK, &count_sink, now_ms) ? ARB_OK : ARB_ERR_BUSY;
+    limb->score = 0;
+    return arb_config_has(&limb->config, limb->number) ? read_all(limb, STAGE_CHECK, now_ms) : ARB_ERR_NUMBER;
 }
 
 /* The memory can be read, and there is room: now the links go into the table. */
 static void end_check(arb_limb_t *limb, uint32_t now_ms)
 {
-    const bool fits = limb->status == ARB_CONFIG_OK && limb->both <= PROFILE_LINKS_MAX;
-    if (!fits || !read_all(limb, STAGE_LOAD, &load_sink, now_ms)) {
-        end(limb, ARB_ERR_STORAGE, 0);
+    if (limb->status != ARB_CONFIG_OK || limb->score > PROFILE_LINKS_MAX ||
+        read_all(limb, STAGE_LOAD, now_ms) != ARB_OK) {
+        end(limb, ARB_ERR_STORAGE);
         return;
     }
-    limb->overflow = false;
     profile_run_load_begin(&limb->run, false);
 }
 
-static void plan(arb_limb_t *limb, pdcp_arb_t *arb, profile_purpose_t purpose, uint8_t what)
+static void plan(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what, bool anew)
 {
     limb->stage = STAGE_PLAN;
-    limb->overflow = false;
-    profile_run_begin(&limb->run, arb, purpose, what);
+    profile_run_begin(&limb->run, arb, what, anew);
 }
 
 static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status != ARB_CONFIG_OK) { /* it could be read a moment ago */
-        end(limb, ARB_ERR_STORAGE, 0);
+        end(limb, ARB_ERR_STORAGE);
         return;
     }
-    const bool overflow = limb->overflow;
     set_active(limb, limb->number);
-    plan(limb, arb, PROFILE_FOR_LOAD, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE);
-    (void)profile_run_take_change(&limb->run);
+    pdcp_arb_plan_links(arb, true);
+    plan(limb, arb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, true);
+    limb->run.changed = false;
     limb->unsaved = false;
-    limb->overflow = overflow; /* the rest is left out */
 }
 
-static uint8_t begin_erase(arb_limb_t *limb, uint32_t now_ms, uint8_t argument)
+static uint8_t begin_erase(arb_limb_t *limb, uint32_t now_ms)
 {
-    limb->number = argument != 0 ? argument : limb->active;
-    if (limb->number == 0) {
-        return ARB_ERR_NUMBER;
-    }
-    const arb_config_status_t status = arb_config_erase(&limb->config, limb->number, on_done, limb, now_ms);
-    if (status != ARB_CONFIG_OK) {
-        return error_of(status);
-    }
-    limb->stage = STAGE_ERASE;
-    limb->done = false;
-    return ARB_OK;
+    return started(limb, STAGE_ERASE, arb_config_erase(&limb->config, limb->number, on_done, limb, now_ms));
 }
 
 static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
@@ -365,20 +315,21 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
             forget_active(limb, arb);
         }
     }
-    end(limb, error_of((arb_config_status_t)limb->status), 0);
+    end(limb, error_of((arb_config_status_t)limb->status));
 }
 
-/* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come. */
-static void plan_for_host(arb_limb_t *limb, pdcp_arb_t *arb, profile_purpose_t purpose, uint8_t what)
+/* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come.
+ * After a clear, no link of the configuration is left, and none counts as working. */
+static void plan_for_host(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what, bool clear)
 {
-    if (limb->run.state != PROFILE_WAITING) {
-        plan(limb, arb, purpose, what);
-        return;
-    }
-    if (purpose == PROFILE_FOR_CLEAR) {
+    if (clear) {
         profile_run_load_begin(&limb->run, false);
     }
-    end(limb, ARB_OK, 0);
+    if (limb->run.state == PROFILE_WAITING) {
+        end(limb, ARB_OK);
+        return;
+    }
+    plan(limb, arb, what, clear);
 }
 
 bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb)
@@ -388,40 +339,36 @@ bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb)
 
 uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t action, uint8_t argument)
 {
-    uint8_t error = ARB_OK;
-    limb->for_host = true;
+    uint8_t what = PROFILE_PLAN_ENFORCE;
     limb->ended = false;
+    limb->error = ARB_OK;
+    limb->result = 0;
+    limb->number = argument != 0 ? argument : limb->active;
     switch ((arb_action_t)action) {
     case ARB_ACTION_SAVE:
-        error = begin_save(limb, arb, now_ms, argument);
-        break;
+        return begin_save(limb, arb, now_ms);
     case ARB_ACTION_LOAD:
-        error = begin_load(limb, now_ms, argument);
-        break;
+        return begin_load(limb, now_ms);
     case ARB_ACTION_ERASE:
-        error = begin_erase(limb, now_ms, argument);
-        break;
+        return begin_erase(limb, now_ms);
+    case ARB_ACTION_ADOPT:
+        limb->result = profile_run_adopt(&limb->run, arb);
+        end(limb, ARB_OK);
+        return ARB_OK;
     case ARB_ACTION_AUTOCONFIGURE:
-        plan_for_host(limb, arb, PROFILE_FOR_EVENT, PROFILE_PLAN_AUTO);
-        break;
-    case ARB_ACTION_CLEAR:
-        plan_for_host(limb, arb, PROFILE_FOR_CLEAR, 0);
-        break;
-    case ARB_ACTION_ENFORCE:
-        plan_for_host(limb, arb, PROFILE_FOR_ENFORCE, 0);
+        what = PROFILE_PLAN_AUTO;
         break;
     case ARB_ACTION_REPLACE:
-        plan_for_host(limb, arb, PROFILE_FOR_EVENT, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE);
+        what = PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE;
         break;
-    case ARB_ACTION_ADOPT:
-        end(limb, ARB_OK, profile_run_adopt(&limb->run, arb));
+    case ARB_ACTION_CLEAR:
+    case ARB_ACTION_ENFORCE:
         break;
     default:
-        error = ARB_ERR_VALUE;
-        break;
+        return ARB_ERR_VALUE;
     }
-    limb->for_host = limb->for_host && error == ARB_OK;
-    return error;
+    plan_for_host(limb, arb, what, action == ARB_ACTION_CLEAR);
+    return ARB_OK;
 }
 
 /* --- What is due --- */
@@ -431,7 +378,7 @@ void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms,
     if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb */
         set_active(limb, 0);
         if (limb->stage == STAGE_PLAN) { /* what the memory is doing goes on */
-            end(limb, ARB_ERR_NOT_READY, 0);
+            end(limb, ARB_ERR_NOT_READY);
         }
     }
     profile_run_on_event(&limb->run, arb, now_ms, event);
@@ -475,19 +422,20 @@ static bool may_auto_save(const arb_limb_t *limb)
 
 static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    if (profile_run_take_change(&limb->run)) {
+    if (limb->run.changed) {
+        limb->run.changed = false;
         limb->unsaved = true;
-        limb->changed_ms = now_ms;
+        limb->save_ms = now_ms + ARB_LIMB_AUTO_SAVE_MS;
     }
-    if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS)) {
-        limb->changed_ms = now_ms; /* if it fails, again after the same time */
-        (void)begin_save(limb, arb, now_ms, 0);
+    if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->save_ms)) {
+        limb->save_ms = now_ms + ARB_LIMB_AUTO_SAVE_MS; /* if it fails, again after the same time */
+        limb->number = limb->active;
+        (void)begin_save(limb, arb, now_ms);
     }
 }
 
 bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t now_ms)
 {
-    limb->arb = arb;
     arb_config_step(&limb->config, nvm, now_ms);
     arb_flags_step(&limb->flags, nvm, now_ms);
     if (limb->done) {
@@ -497,8 +445,9 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
         begin_start(limb, arb, now_ms);
     }
     const bool handed = profile_run_step(&limb->run, arb, now_ms);
-    if (limb->stage == STAGE_PLAN && !limb->run.planning) {
-        end(limb, limb->overflow ? ARB_ERR_STORAGE : ARB_OK, limb->run.moves);
+    if (limb->stage == STAGE_PLAN && limb->run.state != PROFILE_CONFIGURING) {
+        limb->result = limb->run.moves;
+        end(limb, limb->error);
     }
     auto_save(limb, arb, now_ms);
     return handed;
@@ -515,7 +464,7 @@ uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_
     next_ms = earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
     next_ms = earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
     if (may_auto_save(limb)) {
-        next_ms = earlier(next_ms, limb->changed_ms + ARB_LIMB_AUTO_SAVE_MS);
+        next_ms = earlier(next_ms, limb->save_ms);
     }
     return next_ms;
 }

@@ -30,32 +30,27 @@ typedef enum {
     ARB_ACTION_ADOPT = 8
 } arb_action_t;
 
+/* Small state stands first, as in profile_run_t. */
 typedef struct {
-    profile_run_t run;
-    arb_config_t config;
-    arb_flags_t flags;
-    uint8_t flags_on; /* given on the command line: not stored */
-    uint8_t flags_off;
-    uint8_t active; /* configuration, 0: none */
-    uint8_t stage;  /* arb_limb.c: what is under way */
-    uint8_t number; /* configuration that is being saved, loaded or erased */
-    bool done;      /* a job of arb_config has ended, with status */
-    int8_t status;  /* arb_config_status_t */
-    bool for_host;  /* the host waits for the outcome */
-    bool ended;     /* the outcome is there */
-    uint8_t error;  /* arb_error_t */
+    uint8_t in_force; /* flags: as stored, or as the command line says instead */
+    uint8_t active;   /* configuration, 0: none */
+    uint8_t stage;    /* arb_limb.c: what is under way */
+    uint8_t number;   /* configuration that is being read, saved, loaded or erased */
+    bool done;        /* a job of arb_config has ended, with status */
+    int8_t status;    /* arb_config_status_t */
+    bool ended;       /* what the host waits for is there: */
+    uint8_t error;    /* arb_error_t */
     uint16_t result;
-    bool told;     /* active and stored configurations are as the host knows them */
-    bool unsaved;  /* the configuration was changed, for auto-save */
-    bool overflow; /* the configuration has more devices than there is room for */
-    uint32_t changed_ms;
-    /* Start-up: the score of the configuration that is being read and of the best one so far (D-PRO-4). */
-    uint8_t best;
-    uint8_t both;
-    uint8_t one;
-    uint8_t best_both;
-    uint8_t best_one;
-    const pdcp_arb_t *arb; /* while the memory is being read */
+    bool told;             /* active and stored configurations are as the host knows them */
+    bool unsaved;          /* the configuration was changed, for auto-save */
+    uint32_t save_ms;      /* auto-save: when it is due */
+    uint8_t best;          /* start-up: the best configuration so far (D-PRO-4) */
+    uint16_t best_score;   /* its score, 256 for a link with both ends, 1 for one with one end, */
+    uint16_t score;        /* and that of the one that is being read. Load: how many links it has */
+    const pdcp_arb_t *arb; /* of the start-up */
+    arb_flags_t flags;
+    arb_config_t config;
+    profile_run_t run;
 } arb_limb_t;
 
 /* flags_on and flags_off override what is stored. Reads the memory: may block for as long as that takes. */
@@ -88,7 +83,10 @@ bool arb_limb_take_outcome(arb_limb_t *limb, uint8_t *error, uint16_t *result);
 void arb_limb_set_flags(arb_limb_t *limb, uint32_t now_ms, uint8_t flags);
 
 /* The flags as they are in force, bits 0 to 3. */
-uint8_t arb_limb_flags(const arb_limb_t *limb);
+static inline uint8_t arb_limb_flags(const arb_limb_t *limb)
+{
+    return limb->in_force;
+}
 
 /* Profile state of 2401h. */
 static inline uint8_t arb_limb_state(const arb_limb_t *limb)

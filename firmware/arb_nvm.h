@@ -14,6 +14,13 @@
 
 #include "arb_port.h"
 
+/* Different pages that the memory can keep, of the 512 that are addressed. A log in program flash keeps fewer
+ * (-DARB_NVM_PAGES=47). Identities and flags get theirs first, the longest configuration string follows from
+ * what is left (arb_config.h): so such a memory is never too full for a write. */
+#ifndef ARB_NVM_PAGES
+#define ARB_NVM_PAGES 512
+#endif
+
 enum {
     ARB_NVM_FLAGS_AT = 1024,
     ARB_NVM_CONFIG_AT = 2048,
@@ -44,12 +51,16 @@ static inline bool arb_nvm_take(arb_nvm_t *nvm, arb_nvm_user_t user)
     return true;
 }
 
+/* When *due_ms has come, takes the memory for the user and tells how it stands: above 0 it is another one's
+ * or a write is under way, 0 it is ready, below 0 it is, too, but the write before has failed. Above 0 also
+ * before that time, which is put off to the next poll otherwise. */
+int8_t arb_nvm_poll(arb_nvm_t *nvm, arb_nvm_user_t user, uint32_t *due_ms, uint32_t now_ms);
+
 /* The user does not need it any longer. Does nothing if it is not the user's. */
-static inline void arb_nvm_give(arb_nvm_t *nvm, arb_nvm_user_t user)
-{
-    if (nvm->owner == (uint8_t)user) {
-        nvm->owner = ARB_NVM_NOBODY;
-    }
-}
+void arb_nvm_give(arb_nvm_t *nvm, arb_nvm_user_t user);
+
+/* nvm_read and nvm_write of the port. */
+bool arb_nvm_read(const arb_nvm_t *nvm, uint16_t address, uint8_t *bytes, uint16_t size);
+bool arb_nvm_write(const arb_nvm_t *nvm, uint16_t address, const uint8_t *bytes, uint16_t size);
 
 #endif

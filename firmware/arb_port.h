@@ -10,6 +10,14 @@
 
 #include "can_frame.h"
 
+/* In the order of the host's statistics group 3. */
+typedef enum {
+    ARB_PORT_FRAMES_LOST,   /* received, but lost before the application took them */
+    ARB_PORT_FRAMES_UNSENT, /* taken by can_send, but known not to have left */
+    ARB_PORT_BYTES_LOST,    /* from the host, lost before the application took them */
+    ARB_PORT_COUNTERS
+} arb_port_counter_t;
+
 typedef struct {
     void *ctx; /* handed to every function; owned by the program, outlives the application */
 
@@ -34,6 +42,9 @@ typedef struct {
 
     /* The write started last: 0 done, 1 under way, -1 failed. */
     int8_t (*nvm_status)(void *ctx);
+
+    /* What the drivers have counted since the start. NULL: they count nothing. */
+    uint32_t (*counter)(void *ctx, arb_port_counter_t counter);
 } arb_port_t;
 
 #define ARB_PORT_NVM_PAGE 64u /* a write never crosses a multiple of this */

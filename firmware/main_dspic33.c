@@ -7,7 +7,6 @@
 #include "board.h"
 #include "clock.h"
 #include "ecan1.h"
-#include "i2c1.h"
 #include "nvm.h"
 #include "pdcp_time.h"
 #include "sys.h"
@@ -19,8 +18,8 @@
 
 enum { FRAMES = 8, HOST_BYTES = 32, BLINK_MS = 128 };
 
+/* The application last: what stands behind its 11 KB takes longer to reach. */
 typedef struct {
-    arb_app_t app;
     arb_port_t port;
     hal_can_t *can;
     hal_uart_t *uart;
@@ -28,6 +27,7 @@ typedef struct {
     uint32_t next_ms;
     uint8_t host_count; /* bytes that the application has not taken yet */
     uint8_t host_bytes[HOST_BYTES];
+    arb_app_t app;
 } firmware_t;
 
 static firmware_t firmware;
@@ -62,13 +62,22 @@ static int8_t nvm_status(void *ctx)
     return (int8_t)hal_nvm_status(((firmware_t *)ctx)->nvm);
 }
 
+static uint32_t counter(void *ctx, arb_port_counter_t which)
+{
+    const firmware_t *self = ctx;
+    const hal_can_health_t health = hal_can_health(self->can);
+    return which == ARB_PORT_FRAMES_LOST     ? health.rx_overruns
+           : which == ARB_PORT_FRAMES_UNSENT ? health.tx_failed
+                                             : uart1_lost(self->uart);
+}
+
 /* One batch: what is left waits for the next turn, which follows at once. */
 static void take_frames(firmware_t *self, uint32_t now_ms)
 {
     can_frame_t frames[FRAMES];
-    const size_t count = hal_can_receive(self->can, frames, FRAMES);
-    for (size_t i = 0; i < count; i++) {
-        arb_app_on_frame(&self->app, now_ms, &frames[i]);
+    const can_frame_t *end = &frames[hal_can_receive(self->can, frames, FRAMES)];
+    for (const can_frame_t *frame = frames; frame != end; frame++) {
+        arb_app_on_frame(&self->app, now_ms, frame);
     }
     const hal_can_health_t health = hal_can_health(self->can);
     arb_app_on_errors(&self->app, health.tx_errors, health.rx_errors);
@@ -101,7 +110,6 @@ static void start(firmware_t *self)
     if (!clock_start()) {
         sys_fail(SYS_FAULT_CRYSTAL);
     }
-    i2c1_open();
     self->nvm = nvm_open();
     self->uart = uart1_open(UART1_BRG(FIRMWARE_BAUD));
     self->port = (arb_port_t){.ctx = self,
@@ -110,7 +118,8 @@ static void start(firmware_t *self)
                               .host_write = host_write,
                               .nvm_read = nvm_read,
                               .nvm_write = nvm_write,
-                              .nvm_status = nvm_status};
+                              .nvm_status = nvm_status,
+                              .counter = counter};
     const arb_settings_t settings = {.serial = hal_sys_serial()};
     arb_app_init(&self->app, &self->port, &settings, hal_clock_ms());
     /* Last: that reads the EEPROM, and frames that came meanwhile would be old or lost. Now they are
@@ -121,8 +130,8 @@ static void start(firmware_t *self)
 /* Lit; blinks when a fault or the watchdog has restarted the program. */
 static void show_state(uint32_t now_ms)
 {
-    const bool restarted = sys_reset_cause() <= SYS_RESET_ILLEGAL;
-    board_led(!restarted || (now_ms & BLINK_MS) != 0);
+    const bool lit = ((uint16_t)now_ms & BLINK_MS) != 0;
+    board_led(lit || sys_reset_cause() > SYS_RESET_ILLEGAL);
 }
 
 int main(void)

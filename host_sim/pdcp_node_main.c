@@ -1,12 +1,14 @@
 /* pdcp-node: simulated devices on a real or simulated bus. All devices of one process share one controller.
  */
 #include <argp.h>
+#include <errno.h>
 #include <inttypes.h>
 #include <stdbool.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
+#include "arb_version.h"
 #include "hal_can.h"
 #include "hal_sys.h"
 #include "linux_can.h"
@@ -20,7 +22,8 @@ enum {
     FILTERS_MAX = 256,
     EXIT_BAD_START = 2,
     OPTION_SEED = 's',
-    OPTION_STATS = 1
+    OPTION_STATS = 1,
+    OPTION_VERSION
 };
 
 typedef struct {
@@ -50,6 +53,7 @@ static const struct argp_option option_table[] = {
     {"can", 'c', "BUS", 0, "Bus to join: " LINUX_CAN_CHOICES, 0},
     {"seed", OPTION_SEED, "N", 0, "Start of the random numbers; the same seed asks for the same node ids", 0},
     {"stats", OPTION_STATS, NULL, 0, "Write counters to standard error at the end, one JSON object", 0},
+    {"version", OPTION_VERSION, NULL, 0, "Print the version and end", -1},
     {0},
 };
 
@@ -83,6 +87,9 @@ static error_t on_option(int key, char *text, struct argp_state *state)
     case OPTION_STATS:
         options->stats = true;
         return 0;
+    case OPTION_VERSION:
+        (void)printf("pdcp-node %d.%d.%d\n", ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH);
+        exit(EXIT_SUCCESS);
     case ARGP_KEY_ARG:
         if (options->file_count == NODES_MAX) {
             argp_failure(NULL, EXIT_BAD_START, 0, "more than %d devices", NODES_MAX);
@@ -327,6 +334,7 @@ int main(int argc, char **argv)
     options_t options;
     memset(&app, 0, sizeof app);
     memset(&options, 0, sizeof options);
+    argv[0] = program_invocation_short_name; /* what is wrong with an option is told without a path */
     if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
         return EXIT_BAD_START;
     }

@@ -173,6 +173,19 @@ static int8_t nvm_status(void *ctx)
     return (int8_t)hal_nvm_status(daemon->nvm);
 }
 
+/* Neither a pseudo-terminal nor the simulated bus loses anything; of a serial line nobody tells. */
+static uint32_t counter(void *ctx, arb_port_counter_t which)
+{
+    const daemon_t *daemon = ctx;
+    if (daemon->can == NULL) {
+        return 0;
+    }
+    const hal_can_health_t health = hal_can_health(daemon->can);
+    return which == ARB_PORT_FRAMES_LOST     ? health.rx_overruns
+           : which == ARB_PORT_FRAMES_UNSENT ? health.tx_failed
+                                             : 0;
+}
+
 /* --- work --- */
 
 static void on_uart_ready(void *ctx)
@@ -364,7 +377,8 @@ static bool start(daemon_t *daemon)
                                 .host_write = host_write,
                                 .nvm_read = nvm_read,
                                 .nvm_write = nvm_write,
-                                .nvm_status = nvm_status};
+                                .nvm_status = nvm_status,
+                                .counter = counter};
     const arb_settings_t settings = {.serial = hal_sys_serial(),
                                      .strict_crc = daemon->options.strict_crc,
                                      .no_autoconfig = daemon->options.no_autoconfig};
@@ -373,7 +387,7 @@ static bool start(daemon_t *daemon)
     arb_app_observe(&daemon->app, on_event, daemon);
     if (daemon->app.store.damaged != 0) {
         say(daemon, PDCPD_LOG_WARNING, "%s: %u of %d copies of the identities are damaged",
-            daemon->options.nvm, daemon->app.store.damaged, ARB_STORE_AREAS);
+            daemon->options.nvm, daemon->app.store.damaged, ARB_AREAS);
     }
     if (daemon->world != NULL && !sim_world_set_app(daemon->world, &daemon->app)) {
         return complain("the simulated bus has no port left");

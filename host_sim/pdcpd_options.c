@@ -1,6 +1,7 @@
 #include "pdcpd_options.h"
 
 #include <argp.h>
+#include <errno.h>
 #include <ini.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -229,6 +230,7 @@ void pdcpd_options_parse(pdcpd_options_t *options, int argc, char **argv)
         .doc = "Bus arbitrator for the Prosthetic Device Communication Protocol. Runs until SIGTERM.",
     };
     memset(options, 0, sizeof *options);
+    argv[0] = program_invocation_short_name; /* what is wrong with an option is told without a path */
     const pdcpd_log_t not_given = (pdcpd_log_t)(PDCPD_LOG_DEBUG + 1);
     options->log = not_given;
     if (argp_parse(&parser, argc, argv, 0, NULL, options) != 0) {

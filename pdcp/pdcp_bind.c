@@ -121,7 +121,8 @@ static bool is_free(const pdcp_bus_t *bus, uint8_t id)
 static uint8_t pick_id(const pdcp_bus_t *bus)
 {
     const pdcp_bind_t *bind = &bus->bind;
-    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+    for (uint16_t i = PDCP_NODE_MIN; i <= (uint16_t)PDCP_NODE_MAX; i++) {
+        const uint8_t id = (uint8_t)i;
         if (is_free(bus, id) && !is_remembered(bind, id)) {
             return id;
         }

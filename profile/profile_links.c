@@ -15,113 +15,76 @@ static const pdcp_identity_t *owner_of(const profile_links_t *links, const profi
     return &links->parts[end->part].identity;
 }
 
-/* The part with this identity; PDCP_NONE: no entry names this device. *spare: a part that is free, PDCP_NONE:
- * there is none; *unused: how many there are. */
-static uint8_t find_part(const profile_links_t *links, const pdcp_identity_t *identity, uint8_t *spare,
-                         uint8_t *unused)
+/* The part of a device: the used one with this identity, or an unused one, which gets it; it is used now.
+ * PDCP_NONE: there is no room. */
+static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_identity_t *owner)
 {
-    uint8_t used[(PROFILE_PARTS_MAX + 7) / 8];
-    uint8_t found = PDCP_NONE;
-    memset(used, 0, sizeof used);
-    for (uint8_t i = 0; i < links->count; i++) {
-        profile_set_bit(used, links->entries[i].output.part, true);
-        profile_set_bit(used, links->entries[i].input.part, true);
-    }
-    *spare = PDCP_NONE;
-    *unused = 0;
+    uint8_t part = PDCP_NONE;
     for (uint8_t i = 0; i < PROFILE_PARTS_MAX; i++) {
         if (!profile_bit(used, i)) {
-            *spare = i;
-            ++*unused;
-        } else if (pdcp_identity_equal(&links->parts[i].identity, identity)) {
-            found = i;
+            part = i;
+        } else if (pdcp_identity_equal(&links->parts[i].identity, owner)) {
+            return i;
         }
     }
-    return found;
+    if (part != PDCP_NONE) {
+        links->parts[part].identity = *owner;
+        profile_set_bit(used, part, true);
+    }
+    return part;
 }
 
-static bool has_room(const profile_links_t *links, const profile_link_t *link)
+static void put_end(profile_links_t *links, profile_ref_t *ref, uint8_t part, const profile_end_t *end)
 {
-    uint8_t spare;
-    uint8_t unused;
-    uint8_t needed = 0;
-    if (find_part(links, &link->output.owner, &spare, &unused) == PDCP_NONE) {
-        needed++;
-    }
-    if (find_part(links, &link->input.owner, &spare, &unused) == PDCP_NONE) {
-        needed++;
-    }
-    return links->count < PROFILE_LINKS_MAX && needed <= unused;
-}
-
-/* Fills an end of an entry; there is room. */
-static void put_end(profile_links_t *links, profile_ref_t *ref, const profile_end_t *end)
-{
-    uint8_t spare;
-    uint8_t unused;
-    uint8_t part = find_part(links, &end->owner, &spare, &unused);
-    if (part == PDCP_NONE) {
-        part = spare;
-    }
-    links->parts[part].identity = end->owner;
     links->parts[part].type = end->owner_type;
     links->parts[part].profile = end->owner_profile;
-    ref->part = part;
-    ref->index = end->index;
     ref->type = end->type;
     ref->profile = end->profile;
+    ref->part = part;
+    ref->index = end->index;
 }
 
-/* Is the input of entry a before that of entry b? */
-static bool is_before(const profile_links_t *links, const profile_entry_t *a, const profile_entry_t *b)
+/* Makes room for the entry of this input, at its place in the order. */
+static profile_entry_t *insert(profile_links_t *links, const profile_end_t *input)
 {
-    if (a->input.profile != b->input.profile) {
-        return a->input.profile < b->input.profile;
+    profile_entry_t *entry = &links->entries[links->count++];
+    while (entry > links->entries &&
+           profile_precedes(input->profile, &input->owner, input->index, entry[-1].input.profile,
+                            owner_of(links, &entry[-1].input), entry[-1].input.index)) {
+        entry[0] = entry[-1];
+        entry--;
     }
-    const int8_t order = profile_order(owner_of(links, &a->input), owner_of(links, &b->input));
-    return order != 0 ? order < 0 : a->input.index < b->input.index;
-}
-
-/* Moves the last entry to its place. */
-static void sort_in(profile_links_t *links)
-{
-    uint8_t at = (uint8_t)(links->count - 1u);
-    const profile_entry_t entry = links->entries[at];
-    while (at > 0 && is_before(links, &entry, &links->entries[at - 1])) {
-        links->entries[at] = links->entries[at - 1];
-        at--;
-    }
-    links->entries[at] = entry;
-}
-
-static void append(profile_links_t *links, const profile_entry_t *entry)
-{
-    links->entries[links->count++] = *entry;
-    sort_in(links);
+    return entry;
 }
 
 bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool by_host)
 {
+    uint8_t used[(PROFILE_PARTS_MAX + 7) / 8]; /* but for the entry that goes */
     const uint8_t old = profile_links_find(links, &link->input.owner, link->input.index);
-    profile_entry_t removed = {.stand_in = PDCP_NONE};
-    if (old != PDCP_NONE) {
-        removed = links->entries[old];
-        profile_links_remove(links, old);
-    }
-    if (!has_room(links, link)) {
-        if (old != PDCP_NONE) {
-            append(links, &removed);
+    memset(used, 0, sizeof used);
+    for (uint8_t i = 0; i < links->count; i++) {
+        if (i != old) {
+            profile_set_bit(used, links->entries[i].output.part, true);
+            profile_set_bit(used, links->entries[i].input.part, true);
         }
+    }
+    /* If only the second end finds no part, the first one got that of its device in the old entry, or one
+     * that nobody names: nothing has changed. */
+    const uint8_t input = take_part(links, used, &link->input.owner);
+    const uint8_t output = take_part(links, used, &link->output.owner);
+    if (input == PDCP_NONE || output == PDCP_NONE) {
         return false;
     }
-    profile_entry_t *entry = &links->entries[links->count];
+    if (old != PDCP_NONE) {
+        profile_links_remove(links, old);
+    } else if (links->count == PROFILE_LINKS_MAX) {
+        return false;
+    }
+    profile_entry_t *entry = insert(links, &link->input);
+    put_end(links, &entry->input, input, &link->input);
+    put_end(links, &entry->output, output, &link->output);
     entry->stand_in = PDCP_NONE;
     entry->by_host = by_host;
-    put_end(links, &entry->input, &link->input);
-    entry->output.part = entry->input.part;
-    links->count++; /* the part counts as used */
-    put_end(links, &entry->output, &link->output);
-    sort_in(links);
     return true;
 }
 
@@ -132,20 +95,20 @@ void profile_links_remove(profile_links_t *links, uint8_t entry)
             (size_t)(links->count - entry) * sizeof links->entries[0]);
 }
 
-static bool is_sole(uint16_t word)
+/* Does an end name the channel with this owner and index? */
+static bool names(const profile_links_t *links, const profile_ref_t *end, const pdcp_identity_t *owner,
+                  uint8_t index)
 {
-    profile_type_t type;
-    (void)profile_type_decode(word, &type);
-    return type.sole_access;
+    return end->index == index && pdcp_identity_equal(owner_of(links, end), owner);
 }
 
 bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t *link)
 {
-    const uint8_t own = profile_links_find(links, &link->input.owner, link->input.index);
-    for (uint8_t i = 0; i < links->count && is_sole(link->input.type); i++) {
+    for (uint8_t i = 0; i < links->count; i++) {
         const profile_entry_t *entry = &links->entries[i];
-        if (i != own && is_sole(entry->input.type) && entry->output.index == link->output.index &&
-            pdcp_identity_equal(owner_of(links, &entry->output), &link->output.owner)) {
+        if ((link->input.type & entry->input.type & PROFILE_TYPE_SOLE) != 0 &&
+            names(links, &entry->output, &link->output.owner, link->output.index) &&
+            !names(links, &entry->input, &link->input.owner, link->input.index)) {
             return true;
         }
     }
@@ -155,8 +118,7 @@ bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t
 uint8_t profile_links_find(const profile_links_t *links, const pdcp_identity_t *owner, uint8_t index)
 {
     for (uint8_t i = 0; i < links->count; i++) {
-        const profile_ref_t *input = &links->entries[i].input;
-        if (input->index == index && pdcp_identity_equal(owner_of(links, input), owner)) {
+        if (names(links, &links->entries[i].input, owner, index)) {
             return i;
         }
     }
@@ -186,10 +148,11 @@ void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link
     get_end(links, &links->entries[entry].input, &link->input);
 }
 
-bool profile_links_owns(const profile_links_t *links, const profile_ref_t *end, const pdcp_nodes_t *nodes,
-                        uint8_t place)
+bool profile_links_name(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end,
+                        uint8_t channel)
 {
-    return pdcp_identity_equal(owner_of(links, end), &nodes->nodes[place].identity);
+    const pdcp_channel_t *named = &nodes->channels[channel];
+    return names(links, end, &nodes->nodes[named->node].identity, named->index);
 }
 
 uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end)
@@ -208,20 +171,16 @@ uint8_t profile_links_channel(const profile_links_t *links, const pdcp_nodes_t *
     return profile_is_ready(nodes, channel, transfer) ? channel : PDCP_NONE;
 }
 
-static void put_owner(const pdcp_nodes_t *nodes, uint8_t place, profile_end_t *end)
-{
-    end->owner_type = place != PDCP_NONE ? nodes->nodes[place].type : 0;
-    end->owner_profile = place != PDCP_NONE ? nodes->nodes[place].profile : 0;
-}
-
 void profile_end_of(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end)
 {
     const pdcp_channel_t *entry = &nodes->channels[channel];
-    end->owner = nodes->nodes[entry->node].identity;
-    end->index = entry->index;
+    const pdcp_node_t *node = &nodes->nodes[entry->node];
+    end->owner = node->identity;
+    end->owner_type = node->type;
+    end->owner_profile = node->profile;
     end->type = entry->type;
     end->profile = entry->profile;
-    put_owner(nodes, entry->node, end);
+    end->index = entry->index;
 }
 
 bool profile_source_of(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end)
@@ -230,10 +189,16 @@ bool profile_source_of(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *
     if (entry->source_index == PDCP_NO_SOURCE_INDEX || entry->source_index == 0) {
         return false;
     }
+    const uint8_t place = pdcp_nodes_find(nodes, &entry->source);
     end->owner = entry->source;
-    end->index = entry->source_index;
+    end->owner_type = 0;
+    end->owner_profile = 0;
+    if (place != PDCP_NONE) {
+        end->owner_type = nodes->nodes[place].type;
+        end->owner_profile = nodes->nodes[place].profile;
+    }
     end->type = entry->source_type;
     end->profile = entry->source_profile;
-    put_owner(nodes, pdcp_nodes_find(nodes, &entry->source), end);
+    end->index = entry->source_index;
     return true;
 }

@@ -42,9 +42,9 @@ typedef struct {
 } profile_entry_t;
 
 typedef struct {
+    uint8_t count;
     profile_part_t parts[PROFILE_PARTS_MAX]; /* in use: those that an entry names */
     profile_entry_t entries[PROFILE_LINKS_MAX];
-    uint8_t count;
 } profile_links_t;
 
 void profile_links_init(profile_links_t *links);
@@ -66,9 +66,9 @@ uint8_t profile_links_of(const profile_links_t *links, const pdcp_nodes_t *nodes
 /* Takes an entry out in full. */
 void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link_t *link);
 
-/* Does an end name the device at this place? */
-bool profile_links_owns(const profile_links_t *links, const profile_ref_t *end, const pdcp_nodes_t *nodes,
-                        uint8_t place);
+/* Does an end name this channel of the tables? */
+bool profile_links_name(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end,
+                        uint8_t channel);
 
 /* Place of the device that an end names; PDCP_NONE: it is not bound. */
 uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *nodes,

@@ -5,39 +5,36 @@
 #define COMPONENT_BITS 4u
 #define FIRST_COMPONENT 0xF000u
 
-static uint8_t profile_score(uint16_t a, uint16_t b)
+uint8_t profile_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b)
 {
+    const uint16_t types = type_a ^ type_b; /* bits that differ */
+    const uint16_t profiles = profile_a ^ profile_b;
+    uint16_t component = FIRST_COMPONENT;
     uint8_t score = 0;
-    while ((a & FIRST_COMPONENT) != 0 && (a & FIRST_COMPONENT) == (b & FIRST_COMPONENT)) {
-        score = (uint8_t)(score + 8);
-        a = (uint16_t)((uint32_t)a << COMPONENT_BITS);
-        b = (uint16_t)((uint32_t)b << COMPONENT_BITS);
+    if ((types & PROFILE_TYPE_CONTROL) == 0) {
+        score = 4;
+    }
+    if ((types & PROFILE_TYPE_DATA) == 0) {
+        score = (uint8_t)(score + 2u);
+    }
+    if ((types & PROFILE_TYPE_SIZE) == 0) {
+        score++;
+    }
+    while ((profile_a & component) != 0 && (profiles & component) == 0) {
+        score = (uint8_t)(score + 8u);
+        component = (uint16_t)(component >> COMPONENT_BITS);
     }
     return score;
 }
 
-uint8_t profile_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b)
-{
-    profile_type_t a;
-    profile_type_t b;
-    (void)profile_type_decode(type_a, &a);
-    (void)profile_type_decode(type_b, &b);
-    return (uint8_t)(profile_score(profile_a, profile_b) + (a.control == b.control ? 4 : 0) +
-                     (a.data == b.data ? 2 : 0) + (a.size == b.size ? 1 : 0));
-}
-
 bool profile_is_sole(const pdcp_channel_t *channel)
 {
-    profile_type_t type;
-    (void)profile_type_decode(channel->type, &type);
-    return type.sole_access;
+    return (channel->type & PROFILE_TYPE_SOLE) != 0;
 }
 
 bool profile_is_terminal(const pdcp_channel_t *channel)
 {
-    profile_type_t type;
-    (void)profile_type_decode(channel->type, &type);
-    return type.terminal;
+    return (channel->type & PROFILE_TYPE_TERMINAL) != 0;
 }
 
 uint16_t profile_priority(const pdcp_channel_t *channel)
@@ -45,29 +42,30 @@ uint16_t profile_priority(const pdcp_channel_t *channel)
     return channel->terminal_profile != 0 ? channel->terminal_profile : channel->profile;
 }
 
-static int8_t order_words(uint16_t a, uint16_t b)
+bool profile_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index, uint16_t than_profile,
+                      const pdcp_identity_t *than_owner, uint8_t than_index)
 {
-    return (int8_t)(a < b ? -1 : (a > b ? 1 : 0));
-}
-
-int8_t profile_order(const pdcp_identity_t *a, const pdcp_identity_t *b)
-{
-    int8_t order = order_words(a->vid, b->vid);
-    if (order == 0) {
-        order = order_words(a->pid, b->pid);
+    if (profile != than_profile) {
+        return profile < than_profile;
     }
-    return (int8_t)(order != 0 ? order : order_words(a->sn, b->sn));
+    if (owner->vid != than_owner->vid) {
+        return owner->vid < than_owner->vid;
+    }
+    if (owner->pid != than_owner->pid) {
+        return owner->pid < than_owner->pid;
+    }
+    if (owner->sn != than_owner->sn) {
+        return owner->sn < than_owner->sn;
+    }
+    return index < than_index;
 }
 
 bool profile_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b)
 {
     const pdcp_channel_t *first = &nodes->channels[a];
     const pdcp_channel_t *second = &nodes->channels[b];
-    int8_t order = order_words(first->profile, second->profile);
-    if (order == 0) {
-        order = profile_order(&nodes->nodes[first->node].identity, &nodes->nodes[second->node].identity);
-    }
-    return order != 0 ? order < 0 : first->index < second->index;
+    return profile_precedes(first->profile, &nodes->nodes[first->node].identity, first->index,
+                            second->profile, &nodes->nodes[second->node].identity, second->index);
 }
 
 bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer)
@@ -76,8 +74,15 @@ bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transf
         return false;
     }
     const pdcp_channel_t *entry = &nodes->channels[channel];
-    return entry->node != PDCP_NONE && entry->transfer == transfer &&
+    return entry->transfer == transfer && /* a free entry of the pool has none */
            nodes->nodes[entry->node].state == PDCP_NODE_READY;
+}
+
+uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input)
+{
+    const pdcp_channel_t *channel = &nodes->channels[input];
+    return channel->link == PDCP_LINK_ACTIVE && profile_is_ready(nodes, input, PDCP_INPUT) ? channel->feed
+                                                                                           : PDCP_NONE;
 }
 
 bool profile_bit(const uint8_t *bits, uint8_t number)

@@ -26,11 +26,15 @@ uint16_t profile_priority(const pdcp_channel_t *channel);
  * are equally alike; it does not depend on where they stand in the tables (D-PRO-3). */
 bool profile_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b);
 
-/* Order of two identities by VID, PID, SN: below 0, 0, above 0. */
-int8_t profile_order(const pdcp_identity_t *a, const pdcp_identity_t *b);
+/* The same for a channel with this profile, owner and index and another one. */
+bool profile_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index, uint16_t than_profile,
+                      const pdcp_identity_t *than_owner, uint8_t than_index);
 
 /* Is this channel on a device that is set up, and has it this direction (PDCP_INPUT, PDCP_OUTPUT)? */
 bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
+
+/* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
+uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input);
 
 /* Sets of channels or places, a bit for each number. */
 bool profile_bit(const uint8_t *bits, uint8_t number);

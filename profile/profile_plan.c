@@ -7,7 +7,7 @@
 
 /* Where the source of an input comes from, in this order (D-PRO-9). */
 typedef enum {
-    SOURCE_GIVEN,
+    SOURCE_GIVEN,       /* the phase's output */
     SOURCE_ORIGINAL,    /* the one that the active configuration names */
     SOURCE_REPLACEMENT, /* the most similar to the one that it names, which is missing */
     SOURCE_SIMILAR      /* the most similar to the input itself */
@@ -18,10 +18,11 @@ typedef enum { NEED_BY_OUTPUT, NEED_BY_INPUT, DESIRED_BY_OUTPUT, DESIRED_BY_INPU
 
 /* Where a plan is at. Each phase does one unit of its work at a time. */
 typedef enum {
-    PHASE_LOOK,     /* which links work */
-    PHASE_AWAITED,  /* which ends are awaited */
-    PHASE_ROUND,    /* a round begins */
-    PHASE_ORIGINAL, /* from here on in the order of a round */
+    PHASE_LOOK,    /* which links work */
+    PHASE_AWAITED, /* which ends are awaited */
+    PHASE_ROUND,   /* a round consists of these: */
+    PHASE_ENFORCE,
+    PHASE_ORIGINAL,
     PHASE_REPAIR,
     PHASE_SETTLE,
     PHASE_AUTO,
@@ -33,7 +34,6 @@ typedef enum {
     PHASE_REPAIR_INPUT,   /* an input stands in, */
     PHASE_REPAIR_LINK,    /* and is linked */
     PHASE_NAME,
-    PHASE_ENFORCE,
     PHASE_FINISH,
     PHASE_DONE
 } phase_t;
@@ -69,8 +69,10 @@ bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
         return false;
     }
     const pdcp_node_t *node = &scene->nodes->nodes[place];
-    const bool coming = node->state == PDCP_NODE_SETUP && !node->setup_again;
-    return coming || (node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place));
+    if (node->state == PDCP_NODE_SETUP) {
+        return !node->setup_again;
+    }
+    return node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place);
 }
 
 /* --- Ends of the configuration --- */
@@ -82,106 +84,84 @@ static uint8_t entry_of(profile_plan_t *plan, uint8_t input)
     return profile_links_of(plan->links, plan->nodes, input);
 }
 
-/* Channel numbers of an entry's ends, PDCP_NONE: missing. */
+/* Channel number of the output that an entry names, PDCP_NONE: missing. */
 static uint8_t output_of(profile_plan_t *plan, uint8_t entry)
 {
     plan->left -= EFFORT_FIND;
     return profile_links_channel(plan->links, plan->nodes, &entry_at(plan, entry)->output, PDCP_OUTPUT);
 }
 
-static uint8_t input_of(profile_plan_t *plan, uint8_t entry)
+/* Notes both ends of the entry that the phase is at. */
+static void look_at_ends(profile_plan_t *plan)
 {
     plan->left -= EFFORT_FIND;
-    return profile_links_channel(plan->links, plan->nodes, &entry_at(plan, entry)->input, PDCP_INPUT);
+    plan->input =
+        profile_links_channel(plan->links, plan->nodes, &entry_at(plan, plan->at)->input, PDCP_INPUT);
+    plan->output = output_of(plan, plan->at);
 }
 
 /* Is this input linked to the output that an entry names? */
 static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t entry)
 {
     const uint8_t output = plan->want[input];
-    if (output == PDCP_NONE) {
-        return false;
-    }
-    const profile_ref_t *end = &entry_at(plan, entry)->output;
-    const pdcp_channel_t *channel = channel_of(plan, output);
-    return channel->index == end->index && profile_links_owns(plan->links, end, plan->nodes, channel->node);
+    return output != PDCP_NONE &&
+           profile_links_name(plan->links, plan->nodes, &entry_at(plan, entry)->output, output);
 }
 
 /* --- Links of the plan --- */
 
-/* The sole-access input, other than this one, that an output feeds; PDCP_NONE: none. */
-static uint8_t sole_input(const profile_plan_t *plan, uint8_t output, uint8_t other_than)
+/* Another input that wants the output for itself and has it, if this one wants it for itself; PDCP_NONE:
+ * there is none. */
+static uint8_t rival_of(const profile_plan_t *plan, uint8_t input, uint8_t output)
 {
+    if (output == PDCP_NONE || !profile_is_sole(channel_of(plan, input))) {
+        return PDCP_NONE;
+    }
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (plan->want[i] == output && i != other_than && profile_is_sole(channel_of(plan, i))) {
+        if (plan->want[i] == output && i != input && profile_is_sole(channel_of(plan, i))) {
             return i;
         }
     }
     return PDCP_NONE;
 }
 
-static void link_input(profile_plan_t *plan, uint8_t input, uint8_t output)
+/* Gives an input another source, PDCP_NONE: none. The input PDCP_NONE stands for none. */
+static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
 {
+    if (input == PDCP_NONE) {
+        return;
+    }
+    const uint8_t old = plan->want[input];
     plan->want[input] = output;
-    if (profile_is_sole(channel_of(plan, input))) {
+    if (!profile_is_sole(channel_of(plan, input))) {
+        return;
+    }
+    if (old != PDCP_NONE) {
+        plan->left -= EFFORT_SCAN;
+        if (rival_of(plan, input, old) == PDCP_NONE) {
+            profile_set_bit(plan->taken, old, false);
+        }
+    }
+    if (output != PDCP_NONE) {
         profile_set_bit(plan->taken, output, true);
     }
 }
 
-static void unlink_input(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t output = plan->want[input];
-    plan->want[input] = PDCP_NONE;
-    if (output != PDCP_NONE && profile_is_sole(channel_of(plan, input))) {
-        plan->left -= EFFORT_SCAN;
-        profile_set_bit(plan->taken, output, sole_input(plan, output, input) != PDCP_NONE);
-    }
-}
-
-/* What was taken away comes back. */
-static void give_back(profile_plan_t *plan, uint8_t input, uint8_t output)
-{
-    if (input != PDCP_NONE && output != PDCP_NONE) {
-        link_input(plan, input, output);
-    }
-}
-
-static bool is_banned(const profile_plan_t *plan, uint8_t output, uint8_t input)
+/* May this output feed this input? They are of different devices and unbanned, and sole access is respected
+ * [PROFILE listing 4.4]. Both are set up. */
+static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
 {
     const profile_pair_t *banned = plan->scene->banned;
     for (uint8_t i = plan->scene->banned_count; i > 0; i--, banned++) {
         if (banned->output == output && banned->input == input) {
-            return true;
+            return false;
         }
     }
-    return false;
-}
-
-/* May this output feed this input? Both are set up and unbanned, of different devices, and sole access is
- * respected [PROFILE listing 4.4]. */
-static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
-{
-    return is_ready(plan, output, PDCP_OUTPUT) && is_ready(plan, input, PDCP_INPUT) &&
-           channel_of(plan, output)->node != channel_of(plan, input)->node &&
-           !is_banned(plan, output, input) &&
+    return channel_of(plan, output)->node != channel_of(plan, input)->node &&
            !(profile_bit(plan->taken, output) && profile_is_sole(channel_of(plan, input)));
 }
 
-/* --- Candidates --- */
-
-/* What candidates are compared with, and at the other end of the link. */
-typedef struct {
-    uint16_t type;
-    uint16_t profile;
-    uint8_t transfer; /* direction of the candidates */
-    uint8_t partner;
-} model_t;
-
-static uint8_t score_of(const profile_plan_t *plan, uint8_t channel, uint16_t type, uint16_t profile)
-{
-    return profile_similarity(channel_of(plan, channel)->type, channel_of(plan, channel)->profile, type,
-                              profile);
-}
+/* --- Searches --- */
 
 /* May this input take the place of a missing one? It must be nobody's. */
 static bool is_spare(profile_plan_t *plan, uint8_t input)
@@ -193,124 +173,116 @@ static bool is_spare(profile_plan_t *plan, uint8_t input)
     return entry == PDCP_NONE || (!plan->waits && output_of(plan, entry) == PDCP_NONE);
 }
 
-/* May a channel be linked to the partner at the other end? */
-static bool is_candidate(profile_plan_t *plan, const model_t *model, uint8_t channel)
+/* May a channel be linked to the partner, or is it terminal if there is none? */
+static bool is_candidate(profile_plan_t *plan, uint8_t partner, uint8_t channel)
 {
-    if (model->transfer == PDCP_OUTPUT) {
-        return may_link(plan, channel, model->partner);
+    if (partner != PDCP_NONE && channel_of(plan, partner)->transfer == PDCP_INPUT) {
+        return is_ready(plan, channel, PDCP_OUTPUT) && may_link(plan, channel, partner);
     }
-    return may_link(plan, model->partner, channel) && is_spare(plan, channel);
+    if (!is_ready(plan, channel, PDCP_INPUT)) {
+        return false;
+    }
+    if (partner == PDCP_NONE) {
+        return profile_is_terminal(channel_of(plan, channel));
+    }
+    return may_link(plan, partner, channel) && is_spare(plan, channel);
 }
 
+/* Channels are searched in the order of their likeness to an end, terminal ones (NULL) in that in which they
+ * are served: the highest score first. */
+static uint16_t score_of(const profile_plan_t *plan, const profile_ref_t *like, uint8_t channel)
+{
+    const pdcp_channel_t *entry = channel_of(plan, channel);
+    return like != NULL ? profile_similarity(entry->type, entry->profile, like->type, like->profile)
+                        : (uint16_t)~profile_priority(entry);
+}
+
+static bool comes_before(const profile_plan_t *plan, const profile_ref_t *like, uint8_t a, uint8_t b)
+{
+    const uint16_t first = score_of(plan, like, a);
+    const uint16_t second = score_of(plan, like, b);
+    return first != second ? first > second : profile_is_before(plan->nodes, a, b);
+}
+
+/* Notes the channel if it is the best one so far. */
+static void compare(profile_plan_t *plan, const profile_ref_t *like, uint8_t channel)
+{
+    if (plan->best != PDCP_NONE) {
+        if (!comes_before(plan, like, channel, plan->best)) {
+            return;
+        }
+    } else if (like != NULL && score_of(plan, like, channel) < PROFILE_CANDIDATE_MIN) {
+        return;
+    }
+    plan->best = channel;
+}
+
+/* The steps of the searches that follow. */
 static void begin_search(profile_plan_t *plan)
 {
     plan->search_left = (uint16_t)((PROFILE_PLAN_STEPS - plan->steps) / PROFILE_PLAN_SHARE);
-    plan->search_at = 0;
 }
 
-/* Is a channel with this score the best one so far? */
-static void compare(profile_plan_t *plan, uint8_t channel, uint8_t score)
-{
-    if (score > plan->best_score ||
-        (score == plan->best_score &&
-         (plan->best == PDCP_NONE || profile_is_before(plan->nodes, channel, plan->best)))) {
-        plan->best = channel;
-        plan->best_score = score;
-    }
-}
-
-/* A search goes on at search_at, where it begins if that is 0. It looks at one channel at least, however
- * short the slice. */
-static void go_on_searching(profile_plan_t *plan)
+/* Of the channels that may be linked to the partner, the one that comes next behind `tried` in their likeness
+ * to an end; without a partner (PDCP_NONE, NULL) the next terminal one. tried: PDCP_NONE for the first one.
+ * PDCP_NONE: there are no more. The search goes on at search_at, where it begins if that is 0. It looks at
+ * one channel at least, however short the slice. */
+static uint8_t search(profile_plan_t *plan, uint8_t partner, const profile_ref_t *like, uint8_t tried)
 {
     if (plan->search_at == 0) {
         plan->best = PDCP_NONE;
-        plan->best_score = PROFILE_CANDIDATE_MIN;
-    }
-}
-
-/* Goes to the next channel. False: there are no more, or the slice is over. */
-static bool next_channel(profile_plan_t *plan)
-{
-    plan->left--;
-    plan->search_at++;
-    return plan->search_at < PDCP_CHANNELS_MAX && plan->left > 0;
-}
-
-static uint8_t found(profile_plan_t *plan)
-{
-    if (plan->search_at < PDCP_CHANNELS_MAX) {
-        return NOT_YET;
-    }
-    plan->search_at = 0;
-    return plan->best;
-}
-
-/* The channel that comes next behind `tried` in the order of likeness to the model, among those that may be
- * linked to the partner. PDCP_NONE: there are no more. */
-static uint8_t next_candidate(profile_plan_t *plan, const model_t *model, uint8_t tried)
-{
-    const uint8_t tried_score =
-        tried != PDCP_NONE ? score_of(plan, tried, model->type, model->profile) : UINT8_MAX;
-    go_on_searching(plan);
-    if (plan->search_at == 0) {
-        if (plan->search_left < PDCP_CHANNELS_MAX) {
-            return PDCP_NONE;
+        if (partner != PDCP_NONE) {
+            if (plan->search_left < PDCP_CHANNELS_MAX) {
+                return PDCP_NONE;
+            }
+            plan->search_left = (uint16_t)(plan->search_left - PDCP_CHANNELS_MAX);
+            plan->steps += PDCP_CHANNELS_MAX;
         }
-        plan->search_left = (uint16_t)(plan->search_left - PDCP_CHANNELS_MAX);
-        plan->steps += PDCP_CHANNELS_MAX;
     }
     do {
         const uint8_t c = plan->search_at;
-        if (is_candidate(plan, model, c)) {
-            const uint8_t score = score_of(plan, c, model->type, model->profile);
+        if (is_candidate(plan, partner, c)) {
             plan->left -= 4;
-            if (score < tried_score || (score == tried_score && profile_is_before(plan->nodes, tried, c))) {
-                compare(plan, c, score);
+            if (tried == PDCP_NONE || comes_before(plan, like, tried, c)) {
+                compare(plan, like, c);
             }
         }
-    } while (next_channel(plan));
-    return found(plan);
+        plan->left--;
+        plan->search_at++;
+        if (plan->search_at == PDCP_CHANNELS_MAX) {
+            plan->search_at = 0;
+            return plan->best;
+        }
+    } while (plan->left > 0);
+    return NOT_YET;
 }
 
-/* The next candidate of the kind of source that a frame is at. */
-static uint8_t next_of_source(profile_plan_t *plan, const profile_frame_t *frame, uint8_t entry)
-{
-    const pdcp_channel_t *input = channel_of(plan, frame->input);
-    model_t model = {input->type, input->profile, PDCP_OUTPUT, frame->input};
-    if (frame->source != SOURCE_SIMILAR) {
-        const uint8_t original = entry != PDCP_NONE ? output_of(plan, entry) : PDCP_NONE;
-        if (frame->source != SOURCE_REPLACEMENT) {
-            const uint8_t output = frame->source == SOURCE_GIVEN ? plan->given : original;
-            return frame->tried == PDCP_NONE && may_link(plan, output, frame->input) ? output : PDCP_NONE;
-        }
-        if (entry == PDCP_NONE || original != PDCP_NONE) {
-            return PDCP_NONE;
-        }
-        model.type = entry_at(plan, entry)->output.type;
-        model.profile = entry_at(plan, entry)->output.profile;
-    }
-    return next_candidate(plan, &model, frame->tried);
-}
-
-/* The next output to try for the input of the top frame; PDCP_NONE: none is left. */
+/* The next candidate of the kind of source that the top frame is at; PDCP_NONE: there are no more. */
 static uint8_t next_source(profile_plan_t *plan)
 {
-    profile_frame_t *frame = &plan->top;
-    const uint8_t last = plan->depth == 0 ? frame->source : plan->needs_last;
-    const uint8_t entry = entry_of(plan, frame->input);
+    const profile_frame_t *top = &plan->top;
+    const uint8_t entry = entry_of(plan, top->input);
     if (entry != PDCP_NONE && profile_is_awaited(plan->scene, &entry_at(plan, entry)->output)) {
         return PDCP_NONE; /* its source will be back in a moment */
     }
-    for (; frame->source <= last; frame->source++) {
-        const uint8_t output = next_of_source(plan, frame, entry);
-        if (output == NOT_YET) {
-            return NOT_YET;
+    if (top->source == SOURCE_SIMILAR) {
+        const profile_ref_t like = {.type = channel_of(plan, top->input)->type,
+                                    .profile = channel_of(plan, top->input)->profile};
+        return search(plan, top->input, &like, top->tried);
+    }
+    uint8_t output = plan->output;
+    if (top->source != SOURCE_GIVEN) {
+        if (entry == PDCP_NONE) {
+            return PDCP_NONE;
         }
-        frame->tried = output;
-        if (output != PDCP_NONE) {
-            return output;
-        }
+        output = output_of(plan, entry);
+    }
+    if (top->source == SOURCE_REPLACEMENT) {
+        return output != PDCP_NONE ? PDCP_NONE
+                                   : search(plan, top->input, &entry_at(plan, entry)->output, top->tried);
+    }
+    if (top->tried == PDCP_NONE && output != PDCP_NONE && may_link(plan, output, top->input)) {
+        return output;
     }
     return PDCP_NONE;
 }
@@ -320,7 +292,6 @@ static uint8_t next_source(profile_plan_t *plan)
 /* An input is to be connected, on top of the others; the stack of frames replaces recursion. */
 static void push(profile_plan_t *plan, uint8_t input, source_t first)
 {
-    plan->search_at = 0;
     plan->top.input = input;
     plan->top.source = (uint8_t)first;
     plan->top.tried = PDCP_NONE;
@@ -328,29 +299,34 @@ static void push(profile_plan_t *plan, uint8_t input, source_t first)
     plan->top.choosing = true;
 }
 
+/* Where the bits of a frame stand in its byte. */
+static unsigned below_shift(const profile_plan_t *plan)
+{
+    return plan->depth % 2u * 4u;
+}
+
 /* Of a frame below the top, only what cannot be found elsewhere is kept. */
 static void descend(profile_plan_t *plan, uint8_t need)
 {
     profile_frame_t *top = &plan->top;
-    const uint8_t kept = (uint8_t)(top->source << 2 | top->need);
+    const unsigned shift = below_shift(plan);
     uint8_t *below = &plan->below[plan->depth / 2];
-    *below = (uint8_t)(plan->depth % 2 == 0 ? kept : (*below & 0xFu) | (unsigned)kept << 4);
+    *below = (uint8_t)((*below & ~(0xFu << shift)) | (unsigned)(top->source << 2 | top->need) << shift);
     plan->depth++;
     profile_set_bit(plan->open, top->mark, true);
     push(plan, need, SOURCE_ORIGINAL);
 }
 
-/* The top frame is done: back to the one below. False: there is none. */
-static bool ascend(profile_plan_t *plan)
+/* The top frame is done: back to the one below; below the last one the phase goes on. */
+static void ascend(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
     if (plan->depth == 0) {
         plan->connecting = false;
-        return false;
+        return;
     }
     plan->depth--;
-    const uint8_t both = plan->below[plan->depth / 2];
-    const uint8_t kept = plan->depth % 2 == 0 ? both & 0xFu : both >> 4;
+    const unsigned kept = (unsigned)plan->below[plan->depth / 2] >> below_shift(plan);
     do {
         top->mark--;
     } while (!profile_bit(plan->open, top->mark));
@@ -358,16 +334,15 @@ static bool ascend(profile_plan_t *plan)
     top->cursor = top->input;
     top->input = plan->log[top->mark];
     top->tried = plan->want[top->input];
-    top->source = (uint8_t)(kept >> 2);
+    top->source = (uint8_t)(kept >> 2 & 3u);
     top->need = kept & 3u;
     top->choosing = false;
-    return true;
 }
 
 static void undo_to(profile_plan_t *plan, uint8_t mark)
 {
     while (plan->logged > mark) {
-        unlink_input(plan, plan->log[--plan->logged]);
+        set_source(plan, plan->log[--plan->logged], PDCP_NONE);
     }
 }
 
@@ -376,35 +351,38 @@ static bool is_connected(const profile_plan_t *plan, uint8_t input)
     return plan->want[input] != PDCP_NONE && !(plan->finding && profile_bit(plan->of.bits.gone, input));
 }
 
-/* The next unconnected input that the link of a frame requires or desires, required ones first; PDCP_NONE:
- * there are no more. */
-static uint8_t next_need(profile_plan_t *plan, profile_frame_t *frame, need_t end)
+/* The next unconnected input, behind the last one (PDCP_NONE: the first one), that a channel requires or
+ * desires; PDCP_NONE: there are no more. */
+static uint8_t next_need(profile_plan_t *plan, uint8_t by, bool desired, uint8_t last)
 {
-    for (; frame->need < end; frame->need++, frame->cursor = PDCP_NONE) {
-        const uint8_t by = frame->need % 2 == NEED_BY_OUTPUT ? frame->tried : frame->input;
-        const pdcp_node_t *owner = &plan->nodes->nodes[channel_of(plan, by)->node];
-        if (owner->needs_stride == 0) {
-            continue;
-        }
-        uint8_t c = frame->cursor != PDCP_NONE ? channel_of(plan, frame->cursor)->next : owner->first_channel;
-        for (; c != PDCP_NONE; c = channel_of(plan, c)->next) {
-            plan->left--;
-            if (!is_connected(plan, c) && pdcp_nodes_needs(plan->nodes, by, frame->need >= DESIRED_BY_OUTPUT,
-                                                           channel_of(plan, c)->index)) {
-                frame->cursor = c;
-                return c;
-            }
-        }
+    const pdcp_node_t *owner = &plan->nodes->nodes[channel_of(plan, by)->node];
+    if (owner->needs_stride == 0) {
+        return PDCP_NONE;
     }
-    return PDCP_NONE;
+    uint8_t c = last != PDCP_NONE ? channel_of(plan, last)->next : owner->first_channel;
+    while (c != PDCP_NONE) {
+        const pdcp_channel_t *channel = channel_of(plan, c);
+        plan->left--;
+        if (!is_connected(plan, c) && pdcp_nodes_needs(plan->nodes, by, desired, channel->index)) {
+            break;
+        }
+        c = channel->next;
+    }
+    return c;
 }
 
 /* The link of the top frame does not hold: all that was made for it is undone, its next candidate is due. */
 static void reject(profile_plan_t *plan)
 {
     undo_to(plan, plan->top.mark);
-    plan->search_at = 0;
     plan->top.choosing = true;
+}
+
+/* A link that can be undone. */
+static void link_input(profile_plan_t *plan, uint8_t input, uint8_t output)
+{
+    set_source(plan, input, output);
+    plan->log[plan->logged++] = input;
 }
 
 /* Gives the input of the top frame its next candidate. */
@@ -412,20 +390,26 @@ static void choose(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
     const uint8_t output = next_source(plan);
-    if (output == PDCP_NONE) {
-        if (ascend(plan) && top->need < DESIRED_BY_OUTPUT) {
-            reject(plan);
-        }
-    } else if (output != NOT_YET) {
+    if (output == NOT_YET) {
+        return;
+    }
+    top->tried = output;
+    if (output != PDCP_NONE) {
         top->choosing = false;
         top->need = NEED_BY_OUTPUT;
         top->cursor = PDCP_NONE;
         link_input(plan, top->input, output);
-        plan->log[plan->logged++] = top->input;
+    } else if (plan->depth != 0 && top->source < plan->needs_last) {
+        top->source++;
+    } else {
+        ascend(plan);
+        if (top->need < DESIRED_BY_OUTPUT) {
+            reject(plan); /* of the last frame nothing is left to be undone */
+        }
     }
 }
 
-/* Goes on with the top frame. */
+/* Goes on with the top frame: to the next need of its link, required ones first. */
 static void advance(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
@@ -433,11 +417,15 @@ static void advance(profile_plan_t *plan)
         choose(plan);
         return;
     }
-    const uint8_t need = next_need(plan, top, NEEDS_END);
-    if (need == PDCP_NONE) {
-        (void)ascend(plan); /* the link holds */
+    top->cursor = next_need(plan, top->need % 2 == NEED_BY_OUTPUT ? top->tried : top->input,
+                            top->need >= DESIRED_BY_OUTPUT, top->cursor);
+    if (top->cursor == PDCP_NONE) {
+        top->need++;
+        if (top->need == NEEDS_END) {
+            ascend(plan); /* the link holds */
+        }
     } else if (plan->depth < PROFILE_PLAN_DEPTH - 1) {
-        descend(plan, need);
+        descend(plan, top->cursor);
     } else if (top->need < DESIRED_BY_OUTPUT) {
         reject(plan); /* too deep */
     }
@@ -445,13 +433,12 @@ static void advance(profile_plan_t *plan)
 
 /* Connects an input and all that its link requires, and of what it desires as much as can be. Loops end: an
  * input that is being connected counts as connected. If it cannot be, nothing has changed when the phase goes
- * on. given: for SOURCE_GIVEN. */
-static void connect(profile_plan_t *plan, uint8_t input, uint8_t given, source_t source)
+ * on. */
+static void connect(profile_plan_t *plan, uint8_t input, source_t source)
 {
     plan->connecting = true;
     plan->depth = 0;
     plan->logged = 0;
-    plan->given = given;
     plan->needs_last = SOURCE_SIMILAR;
     begin_search(plan);
     push(plan, input, source);
@@ -459,18 +446,26 @@ static void connect(profile_plan_t *plan, uint8_t input, uint8_t given, source_t
 
 /* --- What links require --- */
 
-static bool is_left_alone(profile_plan_t *plan, uint8_t input)
+/* The entry of an input that hears the output which it names; PDCP_NONE: it has none, or hears another one.
+ */
+static uint8_t original_of(profile_plan_t *plan, uint8_t input)
 {
     const uint8_t entry = entry_of(plan, input);
-    return entry != PDCP_NONE && entry_at(plan, entry)->by_host && hears_output_of(plan, input, entry);
+    return entry != PDCP_NONE && hears_output_of(plan, input, entry) ? entry : PDCP_NONE;
 }
 
 /* Does the link of this input lack something that it requires, which takes it away? */
 static bool is_lacking(profile_plan_t *plan, uint8_t input)
 {
-    profile_frame_t frame = {.input = input, .tried = plan->want[input], .cursor = PDCP_NONE};
-    return is_connected(plan, input) && next_need(plan, &frame, DESIRED_BY_OUTPUT) != PDCP_NONE &&
-           !is_left_alone(plan, input);
+    if (!is_connected(plan, input)) {
+        return false;
+    }
+    if (next_need(plan, plan->want[input], false, PDCP_NONE) == PDCP_NONE &&
+        next_need(plan, input, false, PDCP_NONE) == PDCP_NONE) {
+        return false;
+    }
+    const uint8_t original = original_of(plan, input);
+    return original == PDCP_NONE || !entry_at(plan, original)->by_host;
 }
 
 /* Goes to the next entry or input of a phase. True: it was the last one, from the first one again. */
@@ -484,12 +479,18 @@ static bool was_last(profile_plan_t *plan, uint8_t count)
     return true;
 }
 
+static bool was_last_entry(profile_plan_t *plan)
+{
+    return was_last(plan, plan->links->count);
+}
+
 /* Begins to mark as gone the links that lack something they require, and those that require one of these. The
  * phase then goes on. */
 static void find_gone(profile_plan_t *plan)
 {
     memset(plan->of.bits.gone, 0, sizeof plan->of.bits.gone);
     plan->finding = true;
+    plan->spoilt = false;
     plan->changed = false;
     plan->input_at = 0;
 }
@@ -501,6 +502,10 @@ static void find_next(profile_plan_t *plan)
     if (is_lacking(plan, input)) {
         profile_set_bit(plan->of.bits.gone, input, true);
         plan->changed = true;
+        if (input == plan->input ||
+            (!profile_bit(plan->of.bits.lacking, input) && original_of(plan, input) != PDCP_NONE)) {
+            plan->spoilt = true;
+        }
     }
     plan->input_at++;
     if (plan->input_at == PDCP_CHANNELS_MAX) {
@@ -513,21 +518,18 @@ static void find_next(profile_plan_t *plan)
 /* Goes to the part of a round that comes behind this one, of those that are to be planned. */
 static void go_on(profile_plan_t *plan, phase_t done)
 {
-    static const uint8_t whats[] = {[PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
-                                    [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,
-                                    [PHASE_SETTLE] = ALWAYS,
-                                    [PHASE_AUTO] = PROFILE_PLAN_AUTO,
-                                    [PHASE_ROUND_END] = ALWAYS};
+    static const uint8_t whats[] = {
+        [PHASE_ENFORCE] = PROFILE_PLAN_ENFORCE, [PHASE_ORIGINAL] = PROFILE_PLAN_ORIGINALS,
+        [PHASE_REPAIR] = PROFILE_PLAN_REPLACE,  [PHASE_SETTLE] = ALWAYS,
+        [PHASE_AUTO] = PROFILE_PLAN_AUTO,
+    };
     uint8_t phase = (uint8_t)done;
     do {
         phase++;
-    } while (phase < (uint8_t)PHASE_ROUND_END && (plan->what & whats[phase]) == 0);
+    } while (phase != (uint8_t)PHASE_ROUND_END && (plan->what & whats[phase]) == 0);
     plan->phase = phase;
-    plan->at = 0;
     plan->pass = 0;
-    plan->changed = false;
     plan->input = PDCP_NONE;
-    plan->search_at = 0;
 }
 
 /* --- Originals [PROFILE listing 4.3], D-PRO-6 --- */
@@ -537,14 +539,6 @@ static bool stands_in(profile_plan_t *plan, uint8_t input)
 {
     plan->left -= EFFORT_FIND;
     return memchr(plan->stand_in, input, plan->links->count) != NULL;
-}
-
-/* Does the source of this input only stand in: for the one that the configuration names, or the input itself
- * for another? */
-static bool is_standing_in(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t own = entry_of(plan, input);
-    return own != PDCP_NONE ? !hears_output_of(plan, input, own) : stands_in(plan, input);
 }
 
 /* Inputs that do not stand in any more. */
@@ -559,84 +553,77 @@ static void forget_stand_ins(profile_plan_t *plan)
     plan->left -= EFFORT_SCAN;
 }
 
-/* Is this entry's turn in this pass, terminal ones last, and is there something to bring back? */
-static bool is_due(profile_plan_t *plan, uint8_t number)
-{
-    plan->input = input_of(plan, number);
-    plan->output = output_of(plan, number);
-    return plan->input != PDCP_NONE && plan->output != PDCP_NONE &&
-           profile_is_terminal(channel_of(plan, plan->input)) == (plan->pass == 1) &&
-           (plan->want[plan->input] != plan->output || plan->stand_in[number] != PDCP_NONE);
-}
-
 static void next_original(profile_plan_t *plan)
 {
     plan->phase = PHASE_ORIGINAL;
-    if (was_last(plan, plan->links->count)) {
-        plan->pass++;
-    }
+    plan->at++;
 }
 
-/* Makes a link of the configuration whose ends are both there; what stood in for them goes. */
+/* The rival of the input, if its source only stands in for the one that the configuration names, or the rival
+ * itself for another input; PDCP_NONE: there is none. */
+static uint8_t rival_to_go(profile_plan_t *plan)
+{
+    const uint8_t rival = rival_of(plan, plan->input, plan->output);
+    if (rival == PDCP_NONE) {
+        return PDCP_NONE;
+    }
+    const uint8_t own = entry_of(plan, rival);
+    if (own != PDCP_NONE ? hears_output_of(plan, rival, own) : !stands_in(plan, rival)) {
+        return PDCP_NONE;
+    }
+    return rival;
+}
+
+/* Makes a link of the configuration whose ends are both there, in the second pass a terminal one, if there is
+ * something to bring back; what stood in for them goes. */
 static void bring_back(profile_plan_t *plan)
 {
-    if (plan->pass == 2 || plan->links->count == 0) {
-        go_on(plan, PHASE_ORIGINAL);
+    if (plan->at >= plan->links->count) {
+        plan->at = 0;
+        plan->pass++;
+        if (plan->pass == 2) {
+            go_on(plan, PHASE_ORIGINAL);
+        }
         return;
     }
-    if (!is_due(plan, plan->at)) {
+    look_at_ends(plan);
+    const uint8_t input = plan->input;
+    const uint8_t *stand_in = &plan->stand_in[plan->at];
+    if (input == PDCP_NONE || plan->output == PDCP_NONE ||
+        profile_is_terminal(channel_of(plan, input)) != plan->pass ||
+        (plan->want[input] == plan->output && *stand_in == PDCP_NONE)) {
         next_original(plan);
         return;
     }
     forget_stand_ins(plan);
-    const uint8_t stand_in = plan->stand_in[plan->at];
-    const uint8_t other = profile_is_sole(channel_of(plan, plan->input))
-                              ? sole_input(plan, plan->output, plan->input)
-                              : PDCP_NONE;
-    const bool takes = other != PDCP_NONE && other != stand_in && is_standing_in(plan, other);
-    plan->rival = takes ? other : PDCP_NONE;
-    plan->costs = takes || plan->want[plan->input] != PDCP_NONE || stand_in != PDCP_NONE;
     plan->phase = PHASE_ORIGINAL_TAKE;
-    if (plan->costs) {
+    plan->source = plan->want[input];
+    plan->rival = rival_to_go(plan);
+    plan->costs = false;
+    if (plan->rival != PDCP_NONE || plan->source != PDCP_NONE || *stand_in != PDCP_NONE) {
+        plan->costs = true;
         find_gone(plan);
     }
 }
 
-static void take_away(profile_plan_t *plan, uint8_t input)
+/* Gives what an original replaces its sources back, or takes them away (PDCP_NONE). */
+static void set_replaced(profile_plan_t *plan, uint8_t output, uint8_t source)
 {
-    if (input != PDCP_NONE) {
-        unlink_input(plan, input);
-    }
+    set_source(plan, plan->rival, output);
+    set_source(plan, plan->stand_in[plan->at], output);
+    set_source(plan, plan->input, source);
 }
 
 /* What a terminal one needs is searched for; another one must find it connected, or in other originals. */
 static void take_for_original(profile_plan_t *plan)
 {
     memcpy(plan->of.bits.lacking, plan->of.bits.gone, sizeof plan->of.bits.lacking);
-    plan->source = plan->want[plan->input];
-    take_away(plan, plan->input);
-    take_away(plan, plan->stand_in[plan->at]);
-    take_away(plan, plan->rival);
-    connect(plan, plan->input, plan->output, SOURCE_GIVEN);
+    set_replaced(plan, PDCP_NONE, PDCP_NONE);
+    connect(plan, plan->input, SOURCE_GIVEN);
     if (!profile_is_terminal(channel_of(plan, plan->input))) {
         plan->needs_last = SOURCE_ORIGINAL;
     }
     plan->phase = PHASE_ORIGINAL_LINK;
-}
-
-static void keep_original(profile_plan_t *plan)
-{
-    plan->stand_in[plan->at] = PDCP_NONE;
-    next_original(plan);
-}
-
-static void give_up_original(profile_plan_t *plan)
-{
-    undo_to(plan, 0);
-    give_back(plan, plan->rival, plan->output);
-    give_back(plan, plan->stand_in[plan->at], plan->output);
-    give_back(plan, plan->input, plan->source);
-    next_original(plan);
 }
 
 /* What the host has made needs nothing (D-PRO-9). */
@@ -646,81 +633,69 @@ static void link_original(profile_plan_t *plan)
     if (plan->want[input] == PDCP_NONE && entry_at(plan, plan->at)->by_host &&
         may_link(plan, plan->output, input)) {
         link_input(plan, input, plan->output);
-        plan->log[plan->logged++] = input;
     }
+    plan->phase = PHASE_ORIGINAL_JUDGE;
+    plan->spoilt = false;
     if (plan->want[input] == PDCP_NONE) {
-        give_up_original(plan);
+        plan->spoilt = true;
     } else if (plan->costs) {
-        plan->phase = PHASE_ORIGINAL_JUDGE;
         find_gone(plan);
-    } else {
-        keep_original(plan);
     }
 }
 
-static bool is_original(profile_plan_t *plan, uint8_t input)
-{
-    const uint8_t own = entry_of(plan, input);
-    return own != PDCP_NONE && hears_output_of(plan, input, own);
-}
-
-/* Has the link all that it requires, and has no original lost that which it had? */
+/* Is the original linked with all that it requires, and has no other one lost that which it had? */
 static void judge_original(profile_plan_t *plan)
 {
-    bool good = !profile_bit(plan->of.bits.gone, plan->input);
-    for (uint8_t i = 0; good && i < PDCP_CHANNELS_MAX; i++) {
-        good = !profile_bit(plan->of.bits.gone, i) || profile_bit(plan->of.bits.lacking, i) ||
-               !is_original(plan, i);
-    }
-    if (good) {
-        keep_original(plan);
+    if (plan->spoilt) {
+        undo_to(plan, 0);
+        set_replaced(plan, plan->output, plan->source);
     } else {
-        give_up_original(plan);
+        plan->stand_in[plan->at] = PDCP_NONE;
     }
+    next_original(plan);
 }
 
 /* --- Replacements [PROFILE listing 4.6] --- */
 
-static uint8_t replacement_of(profile_plan_t *plan, uint8_t number, uint8_t tried)
+/* The missing end of a link that has exactly one, and nothing that stands in for the other; NULL: it is not
+ * broken. Notes its ends. */
+static const profile_ref_t *broken_end(profile_plan_t *plan)
 {
-    const profile_entry_t *entry = entry_at(plan, number);
-    const uint8_t input = input_of(plan, number);
-    const bool for_output = input != PDCP_NONE;
-    const profile_ref_t *missing = for_output ? &entry->output : &entry->input;
-    const model_t model = {missing->type, missing->profile, for_output ? PDCP_OUTPUT : PDCP_INPUT,
-                           for_output ? input : output_of(plan, number)};
-    return next_candidate(plan, &model, tried);
-}
-
-/* Has this link exactly one end, and nothing that stands in for the other? Notes its ends. */
-static bool is_broken(profile_plan_t *plan, uint8_t number)
-{
-    const profile_entry_t *entry = entry_at(plan, number);
-    plan->input = input_of(plan, number);
-    plan->output = output_of(plan, number);
-    if (plan->input != PDCP_NONE) {
-        return plan->output == PDCP_NONE && plan->want[plan->input] == PDCP_NONE &&
-               !profile_is_awaited(plan->scene, &entry->output);
+    const profile_entry_t *entry = entry_at(plan, plan->at);
+    const profile_ref_t *missing = &entry->output;
+    look_at_ends(plan);
+    if (plan->input == PDCP_NONE) {
+        missing = &entry->input;
+        if (plan->output == PDCP_NONE || plan->stand_in[plan->at] != PDCP_NONE) {
+            return NULL;
+        }
+    } else if (plan->output != PDCP_NONE || plan->want[plan->input] != PDCP_NONE) {
+        return NULL;
     }
-    return plan->output != PDCP_NONE && plan->stand_in[number] == PDCP_NONE &&
-           !profile_is_awaited(plan->scene, &entry->input);
+    return profile_is_awaited(plan->scene, missing) ? NULL : missing;
 }
 
 /* How alike the two ends would be with the best replacement, plus 1; 0: there is none. NOT_YET. */
-static uint8_t repair_key(profile_plan_t *plan, uint8_t number)
+static uint8_t repair_key(profile_plan_t *plan)
 {
     if (plan->search_at == 0) {
         begin_search(plan);
     }
-    const uint8_t best = is_broken(plan, number) ? replacement_of(plan, number, PDCP_NONE) : PDCP_NONE;
+    const profile_ref_t *missing = broken_end(plan);
+    if (missing == NULL) {
+        return 0;
+    }
+    const uint8_t partner = plan->input != PDCP_NONE ? plan->input : plan->output;
+    const uint8_t best = search(plan, partner, missing, PDCP_NONE);
     if (best == NOT_YET) {
         return NOT_YET;
     }
     if (best == PDCP_NONE) {
         return 0;
     }
-    const pdcp_channel_t *end = channel_of(plan, plan->input != PDCP_NONE ? plan->input : plan->output);
-    return (uint8_t)(score_of(plan, best, end->type, end->profile) + 1u);
+    const pdcp_channel_t *one = channel_of(plan, partner);
+    const pdcp_channel_t *other = channel_of(plan, best);
+    return (uint8_t)(profile_similarity(one->type, one->profile, other->type, other->profile) + 1u);
 }
 
 /* Which links are to be repaired first: those whose repaired ends are most alike. */
@@ -730,48 +705,47 @@ static void sort_repairs(profile_plan_t *plan)
         forget_stand_ins(plan);
     }
     if (plan->at < plan->links->count) {
-        const uint8_t key = repair_key(plan, plan->at);
+        const uint8_t key = repair_key(plan);
         if (key == NOT_YET) {
             return;
         }
         plan->of.keys[plan->at] = key;
     }
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         plan->phase = PHASE_REPAIR_CHOOSE;
     }
 }
 
 static void repair(profile_plan_t *plan)
 {
-    uint8_t best = PDCP_NONE;
     uint8_t best_key = 0;
     for (uint8_t e = 0; e < plan->links->count; e++) {
         if (plan->of.keys[e] > best_key) {
-            best = e;
             best_key = plan->of.keys[e];
+            plan->at = e;
         }
     }
     plan->left -= EFFORT_FIND;
-    if (best == PDCP_NONE) {
+    if (best_key == 0) {
+        plan->at = 0;
         plan->phase = PHASE_NAME;
         return;
     }
-    plan->of.keys[best] = 0;
-    if (!is_broken(plan, best)) { /* it may have been connected as a need of another */
+    plan->of.keys[plan->at] = 0;
+    if (broken_end(plan) == NULL) { /* it may have been connected as a need of another */
         return;
     }
     if (plan->input != PDCP_NONE) {
-        connect(plan, plan->input, PDCP_NONE, SOURCE_REPLACEMENT);
+        connect(plan, plan->input, SOURCE_REPLACEMENT);
         return;
     }
     begin_search(plan);
-    plan->entry = best;
     plan->phase = PHASE_REPAIR_INPUT; /* input is PDCP_NONE: none was tried yet */
 }
 
 static void try_input(profile_plan_t *plan)
 {
-    const uint8_t input = replacement_of(plan, plan->entry, plan->input);
+    const uint8_t input = search(plan, plan->output, &entry_at(plan, plan->at)->input, plan->input);
     if (input == NOT_YET) {
         return;
     }
@@ -779,7 +753,7 @@ static void try_input(profile_plan_t *plan)
     if (input != PDCP_NONE) {
         plan->input = input;
         plan->phase = PHASE_REPAIR_LINK;
-        connect(plan, input, plan->output, SOURCE_GIVEN);
+        connect(plan, input, SOURCE_GIVEN);
     }
 }
 
@@ -787,20 +761,19 @@ static void end_try(profile_plan_t *plan)
 {
     plan->phase = PHASE_REPAIR_INPUT;
     if (plan->want[plan->input] != PDCP_NONE) {
-        plan->stand_in[plan->entry] = plan->input;
+        plan->stand_in[plan->at] = plan->input;
         plan->phase = PHASE_REPAIR_CHOOSE;
     }
 }
 
-/* The input, nobody's, that an output feeds and that is most like a missing one; PDCP_NONE: there is none. */
-static uint8_t fed_instead(profile_plan_t *plan, uint8_t output, const profile_ref_t *missing)
+/* The input, nobody's, that the output feeds and that is most like the missing one; PDCP_NONE: there is none.
+ */
+static uint8_t fed_instead(profile_plan_t *plan)
 {
     plan->best = PDCP_NONE;
-    plan->best_score = PROFILE_CANDIDATE_MIN;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (plan->want[i] == output && !stands_in(plan, i) && entry_of(plan, i) == PDCP_NONE) {
-            const uint8_t score = score_of(plan, i, missing->type, missing->profile);
-            compare(plan, i, score);
+        if (plan->want[i] == plan->output && !stands_in(plan, i) && entry_of(plan, i) == PDCP_NONE) {
+            compare(plan, &entry_at(plan, plan->at)->input, i);
         }
     }
     plan->left -= EFFORT_SCAN;
@@ -811,48 +784,26 @@ static uint8_t fed_instead(profile_plan_t *plan, uint8_t output, const profile_r
  * and goes when the original comes back. */
 static void name_stand_in(profile_plan_t *plan)
 {
-    const uint8_t e = plan->at;
-    if (e < plan->links->count && plan->stand_in[e] == PDCP_NONE && input_of(plan, e) == PDCP_NONE) {
-        const uint8_t output = output_of(plan, e);
-        if (output != PDCP_NONE) {
-            plan->stand_in[e] = fed_instead(plan, output, &entry_at(plan, e)->input);
-            plan->named = plan->named || plan->stand_in[e] != PDCP_NONE;
+    uint8_t *stand_in = &plan->stand_in[plan->at];
+    if (plan->at < plan->links->count && *stand_in == PDCP_NONE) {
+        look_at_ends(plan);
+        if (plan->input == PDCP_NONE && plan->output != PDCP_NONE) {
+            *stand_in = fed_instead(plan);
+            if (*stand_in != PDCP_NONE) {
+                plan->named = true;
+            }
         }
     }
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         go_on(plan, PHASE_REPAIR);
     }
 }
 
 /* --- Autoconfiguration [PROFILE listing 4.7] --- */
 
-static bool is_served_before(const profile_plan_t *plan, uint8_t a, uint8_t b)
-{
-    const uint16_t first = profile_priority(channel_of(plan, a));
-    const uint16_t second = profile_priority(channel_of(plan, b));
-    return first != second ? first < second : profile_is_before(plan->nodes, a, b);
-}
-
-/* The terminal channel that is served next behind the last one; PDCP_NONE: there are no more. */
-static uint8_t next_terminal(profile_plan_t *plan, uint8_t last)
-{
-    go_on_searching(plan);
-    do {
-        const uint8_t i = plan->search_at;
-        if (is_ready(plan, i, PDCP_INPUT) && profile_is_terminal(channel_of(plan, i))) {
-            plan->left -= 4;
-            if ((last == PDCP_NONE || is_served_before(plan, last, i)) &&
-                (plan->best == PDCP_NONE || is_served_before(plan, i, plan->best))) {
-                plan->best = i;
-            }
-        }
-    } while (next_channel(plan));
-    return found(plan);
-}
-
 static void autoconfigure(profile_plan_t *plan)
 {
-    const uint8_t input = next_terminal(plan, plan->input);
+    const uint8_t input = search(plan, PDCP_NONE, NULL, plan->input);
     if (input == NOT_YET) {
         return;
     }
@@ -860,45 +811,44 @@ static void autoconfigure(profile_plan_t *plan)
     if (input == PDCP_NONE) {
         go_on(plan, PHASE_AUTO);
     } else if (plan->want[input] == PDCP_NONE && !(plan->waits && entry_of(plan, input) != PDCP_NONE)) {
-        connect(plan, input, PDCP_NONE, SOURCE_SIMILAR);
+        connect(plan, input, SOURCE_SIMILAR);
     }
 }
 
 /* --- The whole --- */
 
-#define HASH_START 2166136261uL
-
-static uint32_t hash(uint32_t sum, uint8_t byte) /* FNV-1a */
+/* The output that feeds an input, as the tables are; PDCP_NONE: none does, or it does not count. */
+static uint8_t working(const profile_scene_t *scene, uint8_t input)
 {
-    return (sum ^ byte) * 16777619uL;
+    const uint8_t feed = profile_feed(scene->nodes, input);
+    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || profile_bit(scene->made, input)) {
+        return PDCP_NONE;
+    }
+    return feed;
+}
+
+/* A hash (FNV-1a) of the links of a plan, or of those that work. */
+static uint32_t hash_links(const profile_plan_t *plan, const profile_scene_t *scene)
+{
+    uint32_t sum = 2166136261uL;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        sum = (sum ^ (plan != NULL ? plan->want[i] : working(scene, i))) * 16777619uL;
+    }
+    return sum;
 }
 
 static uint32_t hash_want(profile_plan_t *plan)
 {
-    uint32_t sum = HASH_START;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        sum = hash(sum, plan->want[i]);
-    }
     plan->left -= 2 * EFFORT_SCAN;
-    return sum;
-}
-
-/* The output that feeds an input, as the tables are; PDCP_NONE: none does. */
-static uint8_t working(const profile_scene_t *scene, uint8_t input)
-{
-    const pdcp_channel_t *channel = &scene->nodes->channels[input];
-    const bool works =
-        channel->link == PDCP_LINK_ACTIVE && profile_is_ready(scene->nodes, input, PDCP_INPUT) &&
-        profile_is_ready(scene->nodes, channel->feed, PDCP_OUTPUT) && !profile_bit(scene->made, input);
-    return works ? channel->feed : PDCP_NONE;
+    return hash_links(plan, NULL);
 }
 
 static void look(profile_plan_t *plan)
 {
-    const uint8_t output = working(plan->scene, plan->at);
-    plan->base = hash(plan->base, output);
-    give_back(plan, plan->at, output);
+    set_source(plan, plan->at, working(plan->scene, plan->at));
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        plan->base = hash_want(plan);
+        plan->before = plan->base;
         plan->phase = PHASE_AWAITED;
     }
 }
@@ -908,20 +858,15 @@ static void find_awaited(profile_plan_t *plan)
     const profile_entry_t *entry = entry_at(plan, plan->at);
     if (plan->at < plan->links->count) {
         plan->left -= 2 * EFFORT_FIND;
-        plan->waits = plan->waits || profile_is_awaited(plan->scene, &entry->output) ||
-                      profile_is_awaited(plan->scene, &entry->input);
+        if (profile_is_awaited(plan->scene, &entry->output) ||
+            profile_is_awaited(plan->scene, &entry->input)) {
+            plan->waits = true;
+        }
     }
-    if (was_last(plan, plan->links->count)) {
+    if (was_last_entry(plan)) {
         forget_stand_ins(plan);
-        plan->phase = (plan->what & PROFILE_PLAN_ENFORCE) != 0 ? PHASE_ENFORCE : PHASE_ROUND;
+        go_on(plan, PHASE_ROUND);
     }
-}
-
-static void begin_round(profile_plan_t *plan)
-{
-    plan->named = false;
-    plan->before = hash_want(plan);
-    go_on(plan, PHASE_ROUND);
 }
 
 /* Takes away, until nothing changes, links that require an input which is not connected (D-PRO-9). A loop in
@@ -929,7 +874,7 @@ static void begin_round(profile_plan_t *plan)
 static void settle(profile_plan_t *plan)
 {
     if (is_lacking(plan, plan->at)) {
-        unlink_input(plan, plan->at);
+        set_source(plan, plan->at, PDCP_NONE);
         plan->changed = true;
     }
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
@@ -943,34 +888,29 @@ static void settle(profile_plan_t *plan)
 /* What a plan takes away may make room for what it has passed over: it goes round until nothing changes. */
 static void end_round(profile_plan_t *plan)
 {
-    plan->rounds--;
-    plan->phase = PHASE_FINISH;
-    if (plan->rounds != 0 && (plan->named || plan->before != hash_want(plan))) {
-        plan->phase = PHASE_ROUND;
+    const uint32_t now = hash_want(plan);
+    plan->rounds++;
+    if (plan->rounds == ROUNDS_MAX || (now == plan->before && !plan->named)) {
+        plan->phase = PHASE_FINISH;
+    } else {
+        plan->before = now;
+        plan->named = false;
+        go_on(plan, PHASE_ROUND);
     }
 }
 
-/* An input gives up its source, in the configuration too when the plan is done: it is marked as gone. */
-static void drop(profile_plan_t *plan, uint8_t input)
-{
-    unlink_input(plan, input);
-    profile_set_bit(plan->of.bits.gone, input, true);
-}
-
-/* Of the sole-access inputs of one output the first one keeps it. */
+/* Of the sole-access inputs of one output the first one keeps it. The others are marked as gone: when the
+ * plan is done they give it up in the configuration, too. */
 static void enforce(profile_plan_t *plan)
 {
-    const uint8_t i = plan->at;
-    const uint8_t output = plan->want[i];
-    for (uint8_t k = 0; output != PDCP_NONE && k < PDCP_CHANNELS_MAX && profile_is_sole(channel_of(plan, i));
-         k++) {
-        if (plan->want[k] == output && k != i && profile_is_sole(channel_of(plan, k))) {
-            drop(plan, profile_is_before(plan->nodes, k, i) ? i : k);
-        }
-    }
+    const uint8_t rival = rival_of(plan, plan->at, plan->want[plan->at]);
     plan->left -= EFFORT_SCAN;
-    if (was_last(plan, PDCP_CHANNELS_MAX)) {
-        go_on(plan, PHASE_REPAIR);
+    if (rival != PDCP_NONE) {
+        const uint8_t last = profile_is_before(plan->nodes, rival, plan->at) ? plan->at : rival;
+        set_source(plan, last, PDCP_NONE);
+        profile_set_bit(plan->of.bits.gone, last, true);
+    } else if (was_last(plan, PDCP_CHANNELS_MAX)) {
+        go_on(plan, PHASE_ENFORCE);
     }
 }
 
@@ -997,27 +937,70 @@ static void finish(profile_plan_t *plan)
     plan->phase = PHASE_DONE;
 }
 
-static void (*const phases[])(profile_plan_t *) = {[PHASE_LOOK] = look,
-                                                   [PHASE_AWAITED] = find_awaited,
-                                                   [PHASE_ROUND] = begin_round,
-                                                   [PHASE_ORIGINAL] = bring_back,
-                                                   [PHASE_REPAIR] = sort_repairs,
-                                                   [PHASE_SETTLE] = settle,
-                                                   [PHASE_AUTO] = autoconfigure,
-                                                   [PHASE_ROUND_END] = end_round,
-                                                   [PHASE_ORIGINAL_TAKE] = take_for_original,
-                                                   [PHASE_ORIGINAL_LINK] = link_original,
-                                                   [PHASE_ORIGINAL_JUDGE] = judge_original,
-                                                   [PHASE_REPAIR_CHOOSE] = repair,
-                                                   [PHASE_REPAIR_INPUT] = try_input,
-                                                   [PHASE_REPAIR_LINK] = end_try,
-                                                   [PHASE_NAME] = name_stand_in,
-                                                   [PHASE_ENFORCE] = enforce,
-                                                   [PHASE_FINISH] = finish};
-
-static bool is_set_up(const profile_scene_t *scene, uint8_t place)
+/* A unit of the phase that the plan is at. */
+static void do_phase(profile_plan_t *plan)
 {
-    return scene->nodes->nodes[place].state == PDCP_NODE_READY;
+    switch (plan->phase) {
+    case PHASE_LOOK:
+        look(plan);
+        break;
+    case PHASE_AWAITED:
+        find_awaited(plan);
+        break;
+    case PHASE_ORIGINAL:
+        bring_back(plan);
+        break;
+    case PHASE_REPAIR:
+        sort_repairs(plan);
+        break;
+    case PHASE_SETTLE:
+        settle(plan);
+        break;
+    case PHASE_AUTO:
+        autoconfigure(plan);
+        break;
+    case PHASE_ROUND_END:
+        end_round(plan);
+        break;
+    case PHASE_ORIGINAL_TAKE:
+        take_for_original(plan);
+        break;
+    case PHASE_ORIGINAL_LINK:
+        link_original(plan);
+        break;
+    case PHASE_ORIGINAL_JUDGE:
+        judge_original(plan);
+        break;
+    case PHASE_REPAIR_CHOOSE:
+        repair(plan);
+        break;
+    case PHASE_REPAIR_INPUT:
+        try_input(plan);
+        break;
+    case PHASE_REPAIR_LINK:
+        end_try(plan);
+        break;
+    case PHASE_NAME:
+        name_stand_in(plan);
+        break;
+    case PHASE_ENFORCE:
+        enforce(plan);
+        break;
+    default:
+        finish(plan);
+        break;
+    }
+}
+
+/* Which devices are set up: a bit per place. */
+static void note_ready(const profile_scene_t *scene, uint8_t ready[PROFILE_PLACE_BYTES])
+{
+    memset(ready, 0, PROFILE_PLACE_BYTES);
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (scene->nodes->nodes[i].state == PDCP_NODE_READY) {
+            profile_set_bit(ready, i, true);
+        }
+    }
 }
 
 void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint8_t what)
@@ -1025,11 +1008,7 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
     memset(plan, 0, sizeof *plan);
     memset(plan->want, PDCP_NONE, sizeof plan->want);
     plan->what = what | ALWAYS;
-    plan->rounds = what == PROFILE_PLAN_ENFORCE ? 1 : ROUNDS_MAX;
-    plan->base = HASH_START;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        profile_set_bit(plan->ready, i, is_set_up(scene, i));
-    }
+    note_ready(scene, plan->ready);
     for (uint8_t e = 0; e < scene->links->count; e++) {
         plan->stand_in[e] = scene->links->entries[e].stand_in;
     }
@@ -1048,7 +1027,7 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
         } else if (plan->finding) {
             find_next(plan);
         } else {
-            phases[plan->phase](plan);
+            do_phase(plan);
         }
     }
     return plan->phase == PHASE_DONE;
@@ -1056,28 +1035,23 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
 
 bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene)
 {
-    bool stale = false;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        stale = stale || profile_bit(plan->ready, i) != is_set_up(scene, i);
-    }
-    return stale;
+    uint8_t ready[PROFILE_PLACE_BYTES];
+    note_ready(scene, ready);
+    return memcmp(ready, plan->ready, sizeof ready) != 0;
 }
 
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)
 {
-    uint32_t sum = HASH_START;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        sum = hash(sum, working(scene, i));
-    }
-    return sum != plan->base;
+    return hash_links(NULL, scene) != plan->base;
 }
 
 bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
 {
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && profile_is_sole(&nodes->channels[input]); i++) {
-        const pdcp_channel_t *other = &nodes->channels[i];
-        if (i != input && profile_is_ready(nodes, i, PDCP_INPUT) && other->link == PDCP_LINK_ACTIVE &&
-            other->feed == output && profile_is_sole(other)) {
+    if (!profile_is_sole(&nodes->channels[input])) {
+        return false;
+    }
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(&nodes->channels[i])) {
             return true;
         }
     }

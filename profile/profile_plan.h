@@ -87,11 +87,10 @@ typedef struct {
     uint16_t search_left; /* steps of the search under way */
     uint8_t what;
     uint8_t phase;
-    uint8_t rounds;   /* that are left */
+    uint8_t rounds;   /* that are over */
     uint8_t at;       /* entry or input that the phase is at */
     uint8_t pass;     /* over the originals */
     uint8_t input_at; /* that find_next is at */
-    uint8_t entry;    /* that is being repaired */
     uint8_t input;    /* the phase's, and its output */
     uint8_t output;
     uint8_t source;     /* what an original replaces: the source that its input had, */
@@ -100,15 +99,14 @@ typedef struct {
     bool named;         /* this round has found stand-ins */
     bool waits;         /* an end of the configuration is awaited */
     bool changed;       /* by this pass over the inputs */
+    bool spoilt;        /* the original at hand lacks something, or another one lost what it has */
     bool finding;       /* links that lack something are being marked, and count as gone */
     bool connecting;    /* an input is being connected: */
-    uint8_t given;      /* the source of SOURCE_GIVEN, */
-    uint8_t needs_last; /* and the last kind of source that may be asked for what its link needs */
+    uint8_t needs_last; /* the last kind of source that may be asked for what its link needs */
     uint8_t depth;      /* frames below the top */
     uint8_t logged;
     uint8_t search_at; /* channel that a search is at, 0: it begins */
     uint8_t best;      /* the best one so far */
-    uint8_t best_score;
     profile_frame_t top;
     uint8_t ready[PROFILE_PLACE_BYTES];   /* bit per place: the device was set up when the plan was begun */
     uint8_t taken[PROFILE_CHANNEL_BYTES]; /* bit per output: it feeds a sole-access input */

@@ -37,46 +37,34 @@ typedef enum {
     PROFILE_JUST_MADE /* carried out from the next step on */
 } profile_making_t;
 
-/* What a plan is made for. */
-typedef enum {
-    PROFILE_FOR_EVENT,   /* from the links that work */
-    PROFILE_FOR_LOAD,    /* from nothing but what the host has made: other links that are not in the
-                            configuration go */
-    PROFILE_FOR_START,   /* the same, with what was read back from the devices as the configuration */
-    PROFILE_FOR_ENFORCE, /* sole access */
-    PROFILE_FOR_CLEAR    /* no links at all */
-} profile_purpose_t;
-
+/* Small state stands first: on the smallest part, a field that lies farther than 511 bytes from the beginning
+ * costs twice the instructions. */
 typedef struct {
-    profile_links_t links; /* the active configuration */
-    profile_plan_t plan;
-    profile_pair_t banned[PROFILE_BANNED_MAX];
     uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
     uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
     uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
     uint8_t banned_count;
-    uint8_t tries;      /* of the link that is being made, this one included */
-    uint8_t state;      /* profile_state_t */
-    uint8_t purpose;    /* profile_purpose_t of the plan under way */
-    uint8_t what;       /* profile_plan_what_t of the plan under way */
-    uint8_t due;        /* of the plan to be made next, 0: none is */
-    bool planning;      /* a plan is being made or carried out */
-    uint8_t making;     /* profile_making_t */
-    bool stale;         /* and what it is made from has changed */
-    bool wishing;       /* the link of wish_output to wish_input has been asked for */
-    bool urgent;        /* the plan that is due does not wait for devices being set up */
-    bool stored;        /* the configuration is a stored one (D-PRO-6) */
-    bool autoconfigure; /* flags of 2404h */
-    bool hot_swap;
-    bool frozen;  /* the configuration must not change (profile_run_freeze) */
-    bool changed; /* the configuration has changed since profile_run_take_change */
-    uint8_t wish_output;
-    uint8_t wish_input;
+    uint8_t tries;       /* of the link that is being made, those before this one */
+    uint8_t state;       /* profile_state_t */
+    uint8_t what;        /* profile_plan_what_t of the plan under way, 0: none is */
+    uint8_t due;         /* of the plan to be made next, 0: none is */
+    uint8_t making;      /* profile_making_t */
+    bool stale;          /* and what it is made from has changed */
+    bool wishing;        /* a link has been asked for, */
+    profile_pair_t wish; /* this one */
+    bool urgent;         /* the plan that is due does not wait for devices being set up; never without due */
+    uint8_t at_start;    /* what may be planned at the start-up, */
+    uint8_t at_events;   /* and when devices come or go: profile_plan_what_t, by the flags of 2404h */
+    bool frozen;         /* the configuration must not change; profile_run_take_up when it may again */
+    bool changed;        /* the configuration has changed; the owner resets it */
     uint16_t moves;      /* links made or taken away by this plan */
     uint32_t stirred_ms; /* when a setup ended last */
-    uint32_t arrived_ms; /* when the first device came for which a plan is due */
+    uint32_t arrival_ms; /* the plan that is due waits so long at most, unless it is urgent */
     uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
     uint32_t retry_ms;   /* means something while links are banned */
+    profile_pair_t banned[PROFILE_BANNED_MAX];
+    profile_plan_t plan;
+    profile_links_t links; /* the active configuration */
 } profile_run_t;
 
 void profile_run_init(profile_run_t *run, uint32_t now_ms);
@@ -102,18 +90,16 @@ bool profile_run_load_link(profile_run_t *run, const profile_link_t *link);
  * back from the sources that the devices name. */
 void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored);
 
-/* Begins a plan for the host. stored is as it was, but after PROFILE_FOR_LOAD. */
-void profile_run_begin(profile_run_t *run, pdcp_arb_t *arb, profile_purpose_t purpose, uint8_t what);
+/* Begins a plan, profile_plan_what_t bits. anew: from nothing but the links that the host has made, others
+ * that are not in the configuration go; else from the links that work. */
+void profile_run_begin(profile_run_t *run, const pdcp_arb_t *arb, uint8_t what, bool anew);
 
 /* Makes what stands in for missing ends the configuration. Returns how many links have changed. */
 uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb);
 
-/* While frozen, the active configuration stays as it is; what has happened meanwhile is taken up afterwards.
- */
-void profile_run_freeze(profile_run_t *run, const pdcp_arb_t *arb, bool frozen);
-
-/* Are all links that work in the active configuration, and none for want of room is not? */
-bool profile_run_is_complete(const profile_run_t *run, const pdcp_arb_t *arb);
+/* Makes links that work without being in the active configuration part of it, unless it is frozen. False: one
+ * is left out, for want of room. */
+bool profile_run_take_up(profile_run_t *run, const pdcp_arb_t *arb);
 
 /* Does what is due. True: the arbitrator was given something to do. */
 bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms);
@@ -123,8 +109,5 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
 
 /* Is a plan due or being carried out? */
 bool profile_run_is_busy(const profile_run_t *run);
-
-/* Has the active configuration changed since the last call? */
-bool profile_run_take_change(profile_run_t *run);
 
 #endif

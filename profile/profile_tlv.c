@@ -7,12 +7,10 @@
 enum {
     TLV_CONFIGURATIONS = 0x01, /* code 1 */
     TLV_LINKS = 0x02,          /* code 3 of this configuration */
-    TLV_IN_LINK = 0x04,
-    TLV_HAS_INPUT = 0x08, /* codes 5 and 6 of this link */
-    TLV_HAS_OUTPUT = 0x10,
-    TLV_AT_INPUT = 0x20, /* which of the two values belong to */
-    TLV_AT_OUTPUT = 0x40,
-    TLV_OF_LINK = TLV_IN_LINK | TLV_HAS_INPUT | TLV_HAS_OUTPUT | TLV_AT_INPUT | TLV_AT_OUTPUT
+    TLV_LINK = 0x04,           /* code 4, and the link goes on */
+    TLV_INPUT = 0x08,          /* codes 5 and 6 of this link */
+    TLV_OUTPUT = 0x10,
+    TLV_OF_LINK = TLV_LINK | TLV_INPUT | TLV_OUTPUT
 };
 
 void profile_tlv_init(profile_tlv_t *reader, const profile_tlv_sink_t *sink, void *ctx)
@@ -22,110 +20,79 @@ void profile_tlv_init(profile_tlv_t *reader, const profile_tlv_sink_t *sink, voi
     reader->ctx = ctx;
 }
 
-static void add_to_set(uint8_t set[PROFILE_TLV_SET_BYTES], uint8_t number)
-{
-    set[number / 8u] = (uint8_t)(set[number / 8u] | (1u << (number % 8u)));
-}
-
 static void end_link(profile_tlv_t *reader)
 {
-    if ((reader->state & TLV_IN_LINK) == 0) {
-        return;
-    }
-    if (reader->sink != NULL && reader->sink->on_link != NULL) {
+    if ((reader->state & TLV_LINK) != 0 && reader->sink != NULL && reader->sink->on_link != NULL) {
         reader->sink->on_link(reader->ctx, reader->number, &reader->link);
     }
     reader->state = (uint8_t)(reader->state & ~(unsigned)TLV_OF_LINK);
+    reader->end = 0;
 }
 
 static profile_tlv_status_t end_configuration(profile_tlv_t *reader)
 {
     end_link(reader);
-    return reader->links_told == reader->links_read ? PROFILE_TLV_MORE : PROFILE_TLV_ERR_COUNT;
+    return reader->links_missing == 0 ? PROFILE_TLV_MORE : PROFILE_TLV_ERR_COUNT;
 }
 
-static profile_tlv_status_t read_configurations(profile_tlv_t *reader, uint16_t value)
+/* What may stand once in what it belongs to; within 0: it stands elsewhere. */
+static profile_tlv_status_t declare(profile_tlv_t *reader, uint8_t within, uint8_t what)
 {
-    if (reader->number != 0) {
+    if (within == 0) {
         return PROFILE_TLV_ERR_PLACE;
     }
-    if ((reader->state & TLV_CONFIGURATIONS) != 0) {
+    if ((reader->state & what) != 0) {
         return PROFILE_TLV_ERR_TWICE;
     }
-    reader->state |= TLV_CONFIGURATIONS;
-    reader->configurations_told = value;
+    reader->state |= what;
+    return PROFILE_TLV_MORE;
+}
+
+/* The number of a configuration or link, each once. */
+static profile_tlv_status_t take_number(uint8_t taken[PROFILE_TLV_SET_BYTES], uint16_t number)
+{
+    if (number > 0xFFu) {
+        return PROFILE_TLV_ERR_RANGE;
+    }
+    if (profile_tlv_has(taken, (uint8_t)number)) {
+        return PROFILE_TLV_ERR_TWICE;
+    }
+    profile_set_bit(taken, (uint8_t)number, true);
     return PROFILE_TLV_MORE;
 }
 
 static profile_tlv_status_t begin_configuration(profile_tlv_t *reader, uint16_t value)
 {
-    const profile_tlv_status_t status = end_configuration(reader);
+    profile_tlv_status_t status = end_configuration(reader);
+    if (status == PROFILE_TLV_MORE) {
+        status = value == 0 ? PROFILE_TLV_ERR_RANGE : take_number(reader->numbers, value);
+    }
     if (status != PROFILE_TLV_MORE) {
         return status;
     }
-    if (value == 0 || value > 0xFFu) {
-        return PROFILE_TLV_ERR_RANGE;
-    }
-    const uint8_t number = (uint8_t)value;
-    if (profile_tlv_has(reader->numbers, number)) {
-        return PROFILE_TLV_ERR_TWICE;
-    }
-    add_to_set(reader->numbers, number);
     memset(reader->links, 0, sizeof reader->links);
-    reader->state = (uint8_t)(reader->state & ~(unsigned)TLV_LINKS);
-    reader->links_told = 0;
-    reader->links_read = 0;
-    reader->number = number;
+    reader->state &= TLV_CONFIGURATIONS;
+    reader->number = (uint8_t)value;
     reader->configurations_read++;
     if (reader->sink != NULL && reader->sink->on_configuration != NULL) {
-        reader->sink->on_configuration(reader->ctx, number);
+        reader->sink->on_configuration(reader->ctx, reader->number);
     }
-    return PROFILE_TLV_MORE;
-}
-
-static profile_tlv_status_t read_links(profile_tlv_t *reader, uint16_t value)
-{
-    if (reader->number == 0) {
-        return PROFILE_TLV_ERR_PLACE;
-    }
-    if ((reader->state & TLV_LINKS) != 0) {
-        return PROFILE_TLV_ERR_TWICE;
-    }
-    reader->state |= TLV_LINKS;
-    reader->links_told = value;
     return PROFILE_TLV_MORE;
 }
 
 static profile_tlv_status_t begin_link(profile_tlv_t *reader, uint16_t value)
 {
     end_link(reader);
-    if (reader->number == 0) {
-        return PROFILE_TLV_ERR_PLACE;
-    }
-    if (value > 0xFFu) {
-        return PROFILE_TLV_ERR_RANGE;
-    }
-    if (profile_tlv_has(reader->links, (uint8_t)value)) {
-        return PROFILE_TLV_ERR_TWICE;
-    }
-    add_to_set(reader->links, (uint8_t)value);
-    reader->links_read++;
-    reader->state |= TLV_IN_LINK;
     memset(&reader->link, 0, sizeof reader->link);
-    return PROFILE_TLV_MORE;
+    reader->links_missing--;
+    const profile_tlv_status_t status = declare(reader, reader->number, TLV_LINK);
+    return status == PROFILE_TLV_MORE ? take_number(reader->links, value) : status;
 }
 
-static profile_tlv_status_t begin_end(profile_tlv_t *reader, uint8_t has, uint8_t at)
+static profile_tlv_status_t begin_end(profile_tlv_t *reader, uint8_t end)
 {
-    if ((reader->state & TLV_IN_LINK) == 0) {
-        return PROFILE_TLV_ERR_PLACE;
-    }
-    if ((reader->state & has) != 0) {
-        return PROFILE_TLV_ERR_TWICE;
-    }
-    const unsigned before = reader->state & ~(unsigned)(TLV_AT_INPUT | TLV_AT_OUTPUT);
-    reader->state = (uint8_t)(before | has | at);
-    return PROFILE_TLV_MORE;
+    reader->end = end;
+    return declare(reader, reader->state & TLV_LINK, end);
 }
 
 /* The 16-bit values of a channel; the index is none of them. */
@@ -151,10 +118,10 @@ static uint16_t *end_field(profile_end_t *end, uint8_t code)
 
 static profile_tlv_status_t read_value(profile_tlv_t *reader, uint8_t code, uint16_t value)
 {
-    if ((reader->state & (TLV_AT_INPUT | TLV_AT_OUTPUT)) == 0) {
+    if (reader->end == 0) {
         return PROFILE_TLV_ERR_PLACE;
     }
-    profile_end_t *end = (reader->state & TLV_AT_INPUT) != 0 ? &reader->link.input : &reader->link.output;
+    profile_end_t *end = reader->end == TLV_INPUT ? &reader->link.input : &reader->link.output;
     if (code != PROFILE_TLV_INDEX) {
         *end_field(end, code) = value;
         return PROFILE_TLV_MORE;
@@ -177,33 +144,36 @@ static profile_tlv_status_t read_entry(profile_tlv_t *reader, uint8_t code, uint
 {
     switch (code) {
     case PROFILE_TLV_CONFIGURATIONS:
-        return read_configurations(reader, value);
+        reader->configurations_told = value;
+        return declare(reader, reader->number == 0 ? 1 : 0, TLV_CONFIGURATIONS);
     case PROFILE_TLV_CONFIGURATION:
         return begin_configuration(reader, value);
     case PROFILE_TLV_LINKS:
-        return read_links(reader, value);
+        reader->links_missing = (uint16_t)(reader->links_missing + value);
+        return declare(reader, reader->number, TLV_LINKS);
     case PROFILE_TLV_LINK:
         return begin_link(reader, value);
     case PROFILE_TLV_INPUT:
-        return begin_end(reader, TLV_HAS_INPUT, TLV_AT_INPUT);
+        return begin_end(reader, TLV_INPUT);
     case PROFILE_TLV_OUTPUT:
-        return begin_end(reader, TLV_HAS_OUTPUT, TLV_AT_OUTPUT);
-    case PROFILE_TLV_END:
-        return end_string(reader);
+        return begin_end(reader, TLV_OUTPUT);
     default:
-        return code >= PROFILE_TLV_TYPE && code <= PROFILE_TLV_OWNER_PROFILE ? read_value(reader, code, value)
-                                                                             : PROFILE_TLV_MORE;
+        break;
     }
+    if (code == PROFILE_TLV_END) {
+        return end_string(reader);
+    }
+    return code >= PROFILE_TLV_TYPE && code <= PROFILE_TLV_OWNER_PROFILE ? read_value(reader, code, value)
+                                                                         : PROFILE_TLV_MORE;
 }
 
 profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *bytes, uint16_t len)
 {
-    for (uint16_t i = 0; i < len && reader->status == PROFILE_TLV_MORE; i++) {
-        if (reader->have < PROFILE_TLV_ENTRY_BYTES - 1) {
-            reader->entry[reader->have++] = bytes[i];
-        } else {
+    for (; len > 0 && reader->status == PROFILE_TLV_MORE; len--) {
+        reader->entry[reader->have++] = *bytes++;
+        if (reader->have == PROFILE_TLV_ENTRY_BYTES) {
             reader->have = 0;
-            const uint16_t value = (uint16_t)(reader->entry[1] | (uint16_t)((uint16_t)bytes[i] << 8));
+            const uint16_t value = pdcp_value_u16(reader->entry, PROFILE_TLV_ENTRY_BYTES, 1);
             reader->status = (int8_t)read_entry(reader, reader->entry[0], value);
         }
     }
@@ -224,13 +194,17 @@ void profile_tlv_put_link_entry(uint8_t bytes[PROFILE_TLV_ENTRY_BYTES], uint8_t 
         profile_tlv_put(bytes, PROFILE_TLV_LINK, index);
         return;
     }
-    const bool is_input = k <= of_end;
-    const uint8_t at = (uint8_t)(is_input ? k - 1 : k - 1 - of_end); /* 0: the end itself, then its values */
-    if (at == 0) {
-        profile_tlv_put(bytes, is_input ? PROFILE_TLV_INPUT : PROFILE_TLV_OUTPUT, 0);
-        return;
+    uint8_t code = PROFILE_TLV_INPUT;
+    profile_end_t end = link->input;
+    if (k > of_end) {
+        code = PROFILE_TLV_OUTPUT;
+        end = link->output;
+        k = (uint8_t)(k - of_end);
     }
-    profile_end_t end = is_input ? link->input : link->output;
-    const uint8_t code = (uint8_t)(PROFILE_TLV_TYPE + at - 1);
-    profile_tlv_put(bytes, code, code == PROFILE_TLV_INDEX ? end.index : *end_field(&end, code));
+    uint16_t value = 0;
+    if (k > 1) { /* not the end itself, but one of its values */
+        code = (uint8_t)(PROFILE_TLV_TYPE + k - 2);
+        value = code == PROFILE_TLV_INDEX ? end.index : *end_field(&end, code);
+    }
+    profile_tlv_put(bytes, code, value);
 }

@@ -15,6 +15,7 @@
 #include <stdint.h>
 
 #include "profile_config.h"
+#include "profile_match.h"
 
 /* Codes [PROFILE table 4.1]. */
 enum {
@@ -73,13 +74,13 @@ typedef struct {
     uint8_t numbers[PROFILE_TLV_SET_BYTES]; /* the configurations so far, bit n: configuration n */
     uint8_t links[PROFILE_TLV_SET_BYTES];   /* the same for the links of this one */
     uint16_t configurations_told;           /* by code 1 */
-    uint16_t links_told;                    /* by code 3 */
-    uint16_t links_read;
+    uint16_t links_missing;                 /* told by code 3 but not read; modulo 65536 */
     uint8_t configurations_read;
     uint8_t number; /* of this configuration, 0: none yet */
     uint8_t state;  /* what has been declared */
+    uint8_t end;    /* of the link, that values belong to; 0: none */
     uint8_t have;   /* bytes in entry */
-    uint8_t entry[PROFILE_TLV_ENTRY_BYTES - 1];
+    uint8_t entry[PROFILE_TLV_ENTRY_BYTES];
     int8_t status; /* profile_tlv_status_t */
 } profile_tlv_t;
 
@@ -92,7 +93,7 @@ profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *byte
 /* Whether a number is in a set, a bit for each. */
 static inline bool profile_tlv_has(const uint8_t set[PROFILE_TLV_SET_BYTES], uint8_t number)
 {
-    return (set[number / 8u] & (1u << (number % 8u))) != 0;
+    return profile_bit(set, number);
 }
 
 /* Writer ------------------------------------------------------------------------------------------------- */

@@ -39,6 +39,13 @@ typedef struct {
     bool terminal;     /* inputs */
 } profile_type_t;
 
+/* The fields of a type word that channels are compared by, and the flags. */
+#define PROFILE_TYPE_SIZE 0xC000u
+#define PROFILE_TYPE_DATA 0x3000u
+#define PROFILE_TYPE_CONTROL 0x0C00u
+#define PROFILE_TYPE_SOLE 0x0200u
+#define PROFILE_TYPE_TERMINAL 0x0100u
+
 /* Takes a type word apart. False: a float that has not 16 bits (D-PRO-2); type is filled all the same. Unused
  * bits are ignored. */
 bool profile_type_decode(uint16_t word, profile_type_t *type);
@@ -49,7 +56,7 @@ uint16_t profile_type_encode(const profile_type_t *type);
 /* Bytes of one value: 1 for 4 and 8 bits, 2 for 12 and 16. */
 uint8_t profile_type_bytes(const profile_type_t *type);
 
-/* Smallest and largest value. False: float, which has no such range. Boolean: 0 and 1. */
+/* Smallest and largest value. False: float, which has no such range; nothing is written. Boolean: 0 and 1. */
 bool profile_type_range(const profile_type_t *type, int32_t *min, int32_t *max);
 
 /* Writes one value, least significant byte first, unused upper bits 0. value is clamped to the range; a

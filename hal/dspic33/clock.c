@@ -19,7 +19,7 @@ PART_ASSERT(clock_tick_exact, TICK_PERIOD *TICK_PRESCALER * 1000u == BOARD_FCY &
 
 enum {
     COSC_PRIMARY_PLL = 3,
-    /* A round of the waits below takes at least 5 cycles, and the internal oscillator gives 3.7 MIPS: 20 ms.
+    /* A round of the wait below takes at least 5 cycles, and the internal oscillator gives 3.7 MIPS: 20 ms.
      * The crystal starts within 1024 of its periods, the PLL locks within 3 ms. */
     WAIT_ROUNDS = 15000
 };
@@ -33,10 +33,7 @@ static bool switch_oscillator(void)
     PLLFBD = (uint16_t)(PLL_M - 2u);
     __builtin_write_OSCCONH(COSC_PRIMARY_PLL);
     __builtin_write_OSCCONL((uint8_t)(OSCCON | 1u)); /* OSWEN */
-    while (OSCCONbits.OSWEN && --rounds != 0) {
-    }
-    rounds = WAIT_ROUNDS;
-    while (!OSCCONbits.LOCK && --rounds != 0) {
+    while ((OSCCONbits.OSWEN || !OSCCONbits.LOCK) && --rounds != 0) {
     }
     return OSCCONbits.COSC == COSC_PRIMARY_PLL && OSCCONbits.LOCK;
 }

@@ -6,6 +6,7 @@
 #include "handlers.h"
 #include "part.h"
 #include "ring.h"
+#include "sys.h"
 
 /* --- bit timing [PDCP 2.2]: 1 Mbit/s, sampled at 75 to 80 % of the bit --- */
 
@@ -43,7 +44,6 @@ enum {
     PRIORITIES = 4,
     TX_PLACES = 4, /* of one priority */
     RX_PLACES = PART_CAN_RX_PLACES,
-    FILTERS_MAX = 8,
     MODE_NORMAL = 0,
     MODE_DISABLED = 1,
     MODE_CONFIGURATION = 4,
@@ -76,28 +76,26 @@ enum { W0_IDE = 0x0001, W0_SRR = 0x0002, W2_RTR = 0x0200, W2_DLC = 0x000F };
 
 static volatile uint16_t ecan1_buffers[BUFFERS][WORDS] PART_DMA_MEMORY(512);
 
-/* What is kept of a received buffer: all but the extended identifier. */
+/* A frame in a queue: what a buffer holds, without the extended identifier. */
 typedef struct {
     uint16_t word_0;
     uint16_t word_2;
     uint16_t data[4];
 } raw_frame_t;
 
+typedef struct {
+    ring_t ring;
+    raw_frame_t frames[TX_PLACES];
+} tx_queue_t;
+
 struct hal_can {
     ring_t rx_ring;
-    ring_t tx_rings[PRIORITIES];
-    volatile bool loaded[PRIORITIES]; /* the buffer of this priority holds the first frame of its queue */
-    uint8_t refused;                  /* priority of the frame that was refused last; PRIORITIES: none was */
-    bool down;
-    volatile bool held; /* bus-off, until the restart */
+    const ring_t *refused; /* the queue that did not take the last frame; NULL: it was taken */
     volatile uint8_t errors_seen;
     uint8_t errors_told;
-    volatile uint32_t rx_overruns;
-    volatile uint32_t tx_failed;
-    uint8_t filter_count;
-    hal_can_filter_t filters[FILTERS_MAX];
+    volatile hal_can_health_t health; /* counters of frames; bus-off from there to the restart; down */
+    tx_queue_t tx_queues[PRIORITIES]; /* the first frame of each stands in the buffer of its priority, too */
     raw_frame_t rx_frames[RX_PLACES];
-    can_frame_t tx_frames[PRIORITIES][TX_PLACES];
 };
 
 static struct hal_can ecan1;
@@ -135,9 +133,7 @@ static void start_dma(void)
     DMA1CONbits.CHEN = 1;
 }
 
-/* Filter 0 with mask 0 takes every frame of either kind into the FIFO. Filters of the controller see no
- * remote bit, so they cannot let all remote frames through, as hal_can.h wants it: filtering is done in
- * hal_can_receive. */
+/* Filter 0 with mask 0 takes every frame of either kind into the FIFO. */
 static void accept_all(void)
 {
     C1CTRL1bits.WIN = 1;
@@ -169,13 +165,29 @@ static void clear_flags(void)
     C1INTF = 0;
 }
 
+/* The buffer of a priority; 0 is the most urgent. */
+PART_INLINE volatile uint16_t *tx_control(uint8_t priority)
+{
+    return &C1TR01CON + priority;
+}
+
+/* The transmit buffers are taken back before their queues are emptied: nothing of them may leave later. */
+static void drop_all(void)
+{
+    for (uint8_t priority = 0; priority < PRIORITIES; priority++) {
+        ring_t *ring = &ecan1.tx_queues[priority].ring;
+        *tx_control(priority) = (uint16_t)(TX_ENABLE | (PRIORITIES - 1u - priority));
+        ecan1.health.tx_failed += ring_count(ring);
+        ring->tail = ring->head;
+    }
+}
+
 hal_can_t *ecan1_open(void)
 {
     IEC2bits.C1IE = 0;
     memset(&ecan1, 0, sizeof ecan1);
-    ecan1.refused = PRIORITIES;
     if (!enter_configuration()) {
-        ecan1.down = true;
+        ecan1.health.state = HAL_CAN_DOWN;
         return &ecan1;
     }
     C1CTRL1bits.CANCKS = PART_CAN_CANCKS;
@@ -187,10 +199,7 @@ hal_can_t *ecan1_open(void)
         ecan1_buffers[i][0] = UNUSED;
     }
     start_dma();
-    C1TR01CON = TX_ENABLE | 3; /* the lower half's buffer, priority 3 to 0 */
-    C1TR23CON = TX_ENABLE | 2;
-    C1TR45CON = TX_ENABLE | 1;
-    C1TR67CON = TX_ENABLE;
+    drop_all();
     clear_flags();
     C1INTE = INTF_TB | INTF_RB | INTF_RBOV | INTF_ERR | INTF_IVR;
     IPC8bits.C1IP = PART_LEVEL_CAN;
@@ -202,103 +211,71 @@ hal_can_t *ecan1_open(void)
 
 /* --- out --- */
 
-static void request(uint8_t priority)
-{
-    switch (priority) {
-    case 0:
-        C1TR01CON = TX_ENABLE | TX_REQUEST | 3;
-        break;
-    case 1:
-        C1TR23CON = TX_ENABLE | TX_REQUEST | 2;
-        break;
-    case 2:
-        C1TR45CON = TX_ENABLE | TX_REQUEST | 1;
-        break;
-    default:
-        C1TR67CON = TX_ENABLE | TX_REQUEST;
-        break;
-    }
-}
-
-static bool requested(uint8_t priority)
-{
-    const uint16_t control = priority == 0   ? C1TR01CON
-                             : priority == 1 ? C1TR23CON
-                             : priority == 2 ? C1TR45CON
-                                             : C1TR67CON;
-    return (control & TX_REQUEST) != 0;
-}
-
+/* The first frame of a queue into its buffer. */
 static void load(uint8_t priority)
 {
-    const ring_t *ring = &ecan1.tx_rings[priority];
-    const can_frame_t *frame = &ecan1.tx_frames[priority][ring_place(ring->tail, TX_PLACES)];
+    const tx_queue_t *queue = &ecan1.tx_queues[priority];
+    const raw_frame_t *raw = &queue->frames[ring_place(queue->ring.tail, TX_PLACES)];
     volatile uint16_t *words = ecan1_buffers[priority * 2];
-    words[0] = (uint16_t)(frame->id << 2);
+    words[0] = raw->word_0;
     words[1] = 0;
-    words[2] = frame->dlc;
-    for (uint8_t i = 0; i < 4; i++) {
-        words[3 + i] = (uint16_t)(frame->data[2 * i] | (uint16_t)frame->data[2 * i + 1] << 8);
-    }
-    ecan1.loaded[priority] = true;
-    request(priority);
+    words[2] = raw->word_2;
+    words[3] = raw->data[0];
+    words[4] = raw->data[1];
+    words[5] = raw->data[2];
+    words[6] = raw->data[3];
+    *tx_control(priority) = (uint16_t)(TX_ENABLE | TX_REQUEST | (PRIORITIES - 1u - priority));
 }
 
-/* Takes the frames that have left out of their queues and loads the next ones. From the handler, or with it
- * off. */
-static void advance_tx(void)
+/* Takes the frames that have left out of their queues and loads the next ones. */
+PART_INLINE void advance_tx(void)
 {
     for (uint8_t priority = 0; priority < PRIORITIES; priority++) {
-        ring_t *ring = &ecan1.tx_rings[priority];
-        if (ecan1.loaded[priority] && !requested(priority)) {
-            ecan1.loaded[priority] = false;
+        ring_t *ring = &ecan1.tx_queues[priority].ring;
+        if (ring_count(ring) != 0 && (*tx_control(priority) & TX_REQUEST) == 0) {
             ring->tail++;
-        }
-        if (!ecan1.loaded[priority] && ring_count(ring) != 0) {
-            load(priority);
+            if (ring_count(ring) != 0) {
+                load(priority);
+            }
         }
     }
 }
 
+/* With the handler off: it takes frames out of the queue, and finds that the bus is off. */
 bool hal_can_send(hal_can_t *can, const can_frame_t *frame)
 {
-    const uint8_t priority = (uint8_t)(frame->id >> 9);
-    ring_t *ring = &can->tx_rings[priority];
-    if (can->down || can->held || ring_count(ring) == TX_PLACES) {
-        can->refused = priority;
-        return false;
-    }
-    can->refused = PRIORITIES;
-    can->tx_frames[priority][ring_place(ring->head, TX_PLACES)] = *frame;
-    unsigned int saved;
-    PART_LOCK(saved);
-    if (!can->held) {
-        ring->head++;
-        if (!can->loaded[priority]) {
+    const uint16_t id = frame->id;
+    const uint8_t priority = (uint8_t)(id >> 9);
+    tx_queue_t *queue = &can->tx_queues[priority];
+    const unsigned int saved = sys_lock();
+    const uint8_t waiting = ring_count(&queue->ring);
+    can->refused = &queue->ring;
+    if (waiting != TX_PLACES && can->health.state == HAL_CAN_ACTIVE) {
+        raw_frame_t *raw = &queue->frames[ring_place(queue->ring.head, TX_PLACES)];
+        can->refused = NULL;
+        raw->word_0 = (uint16_t)(id << 2);
+        raw->word_2 = frame->dlc;
+        memcpy(raw->data, frame->data, sizeof raw->data); /* either has the LSB first */
+        queue->ring.head++;
+        if (waiting == 0) {
             load(priority);
         }
     }
-    PART_UNLOCK(saved);
-    return true;
+    sys_unlock(saved);
+    return can->refused == NULL;
 }
 
 /* --- in --- */
 
-PART_INLINE bool is_full(uint8_t buffer)
+/* The register of a buffer's flag. A flag is cleared by writing 0; a 1 leaves it alone. */
+PART_INLINE volatile uint16_t *full_flags(uint8_t buffer)
 {
-    const uint16_t flags = buffer < 16 ? C1RXFUL1 : C1RXFUL2;
-    return (flags >> (buffer & 15u) & 1u) != 0;
+    return buffer < 16 ? &C1RXFUL1 : &C1RXFUL2;
 }
 
-/* The flags are cleared by writing 0; a 1 leaves them alone. */
-PART_INLINE void release(uint8_t buffer)
+PART_INLINE uint16_t flag_of(uint8_t buffer)
 {
-    const uint16_t others = (uint16_t) ~(1u << (buffer & 15u));
-    if (buffer < 16) {
-        C1RXFUL1 = others;
-    } else {
-        C1RXFUL2 = others;
-    }
+    return (uint16_t)(1u << (buffer & 15u));
 }
 
 PART_INLINE void take_buffer(uint8_t buffer)
@@ -306,7 +283,7 @@ PART_INLINE void take_buffer(uint8_t buffer)
     volatile uint16_t *words = ecan1_buffers[buffer];
     ring_t *ring = &ecan1.rx_ring;
     if (words[0] == UNUSED) {
-        ecan1.rx_overruns++; /* DMA put it elsewhere */
+        ecan1.health.rx_overruns++; /* DMA put it elsewhere */
     } else {
         raw_frame_t *place = &ecan1.rx_frames[ring_place(ring->head, RX_PLACES)];
         place->word_0 = words[0];
@@ -318,16 +295,7 @@ PART_INLINE void take_buffer(uint8_t buffer)
         ring->head++;
     }
     words[0] = UNUSED;
-    release(buffer);
-}
-
-/* The next full buffer behind this one; there is one. */
-static uint8_t next_full(uint8_t buffer)
-{
-    do {
-        buffer = buffer == BUFFERS - 1 ? FIFO_FIRST : (uint8_t)(buffer + 1);
-    } while (!is_full(buffer));
-    return buffer;
+    *full_flags(buffer) = (uint16_t)~flag_of(buffer);
 }
 
 PART_INLINE bool fifo_holds_frames(void)
@@ -340,157 +308,98 @@ PART_INLINE bool fifo_holds_frames(void)
 PART_INLINE void drain_fifo(void)
 {
     while (fifo_holds_frames() && ring_count(&ecan1.rx_ring) != RX_PLACES) {
-        const uint8_t buffer = (uint8_t)C1FIFObits.FNRB;
-        take_buffer(is_full(buffer) ? buffer : next_full(buffer));
-    }
-}
-
-static uint8_t count_bits(uint16_t bits)
-{
-    uint8_t count = 0;
-    for (; bits != 0; bits &= (uint16_t)(bits - 1u)) {
-        count++;
-    }
-    return count;
-}
-
-static void count_overflows(void)
-{
-    const uint16_t low = C1RXOVF1;
-    const uint16_t high = C1RXOVF2;
-    C1RXOVF1 = (uint16_t)~low;
-    C1RXOVF2 = (uint16_t)~high;
-    ecan1.rx_overruns += (uint16_t)(count_bits(low) + count_bits(high));
-}
-
-static bool passes(const hal_can_t *can, const can_frame_t *frame)
-{
-    if (can->filter_count == 0 || frame->kind != CAN_FRAME_BASE) {
-        return true;
-    }
-    for (uint8_t i = 0; i < can->filter_count; i++) {
-        if ((frame->id & can->filters[i].mask) == can->filters[i].id) {
-            return true;
+        uint8_t buffer = (uint8_t)C1FIFObits.FNRB;
+        while ((*full_flags(buffer) & flag_of(buffer)) == 0) {
+            buffer = buffer == BUFFERS - 1 ? FIFO_FIRST : (uint8_t)(buffer + 1);
         }
+        take_buffer(buffer);
     }
-    return false;
+}
+
+/* Clears a register of overflow flags, and counts those that were set. */
+static void count_overflows(volatile uint16_t *flags)
+{
+    uint16_t bits = *flags;
+    *flags = (uint16_t)~bits;
+    for (; bits != 0; bits &= (uint16_t)(bits - 1u)) {
+        ecan1.health.rx_overruns++;
+    }
 }
 
 static void decode(const raw_frame_t *raw, can_frame_t *frame)
 {
     const uint8_t dlc = (uint8_t)(raw->word_2 & W2_DLC);
-    frame->dlc = dlc > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : dlc;
-    for (uint8_t i = 0; i < 4; i++) {
-        frame->data[2 * i] = (uint8_t)raw->data[i];
-        frame->data[2 * i + 1] = (uint8_t)(raw->data[i] >> 8);
-    }
     frame->id = 0;
-    if ((raw->word_0 & W0_IDE) != 0) {
-        frame->kind = (raw->word_2 & W2_RTR) != 0 ? CAN_FRAME_REMOTE : CAN_FRAME_EXTENDED;
-    } else if ((raw->word_0 & W0_SRR) != 0) {
-        frame->kind = CAN_FRAME_REMOTE;
-    } else {
+    frame->dlc = dlc > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : dlc;
+    memcpy(frame->data, raw->data, sizeof frame->data);
+    if ((raw->word_0 & (W0_IDE | W0_SRR)) == 0) {
         frame->kind = CAN_FRAME_BASE;
         frame->id = (uint16_t)(raw->word_0 >> 2);
+    } else if ((raw->word_0 & W0_IDE) != 0 && (raw->word_2 & W2_RTR) == 0) {
+        frame->kind = CAN_FRAME_EXTENDED;
+    } else {
+        frame->kind = CAN_FRAME_REMOTE;
     }
 }
 
 size_t hal_can_receive(hal_can_t *can, can_frame_t *frames, size_t max)
 {
+    ring_t *ring = &can->rx_ring;
     size_t count = 0;
-    while (count < max && ring_count(&can->rx_ring) != 0) {
-        decode(&can->rx_frames[ring_place(can->rx_ring.tail, RX_PLACES)], &frames[count]);
-        can->rx_ring.tail++;
-        if (passes(can, &frames[count])) {
-            count++;
-        }
+    for (; count < max && ring_count(ring) != 0; count++) {
+        decode(&can->rx_frames[ring_place(ring->tail, RX_PLACES)], &frames[count]);
+        ring->tail++;
     }
     if (fifo_holds_frames()) {
         IFS2bits.C1IF = 1; /* runs the handler: there is room in the ring now */
     }
-    while (count < max && can->errors_told != can->errors_seen) {
+    for (; count < max && can->errors_told != can->errors_seen; count++) {
         can->errors_told++;
-        memset(&frames[count], 0, sizeof frames[count]);
-        frames[count].kind = CAN_FRAME_ERROR;
-        count++;
+        frames[count] = (can_frame_t){.kind = CAN_FRAME_ERROR};
     }
     return count;
 }
 
+/* Everything is accepted: filters of the controller see no remote bit, so they could not let all remote
+ * frames through, as hal_can.h wants it. */
 void hal_can_set_filters(hal_can_t *can, const hal_can_filter_t *filters, size_t n)
 {
-    can->filter_count = n > FILTERS_MAX ? 0 : (uint8_t)n;
-    if (can->filter_count != 0) {
-        memcpy(can->filters, filters, n * sizeof filters[0]);
-    }
+    (void)can;
+    (void)filters;
+    (void)n;
 }
 
 bool ecan1_has_work(const hal_can_t *can)
 {
-    if (ring_count(&can->rx_ring) != 0 || can->errors_told != can->errors_seen) {
-        return true;
-    }
-    return can->refused != PRIORITIES && !can->held && !can->down &&
-           ring_count(&can->tx_rings[can->refused]) < TX_PLACES;
+    return ring_count(&can->rx_ring) != 0 || can->errors_told != can->errors_seen ||
+           (can->refused != NULL && can->health.state == HAL_CAN_ACTIVE &&
+            ring_count(can->refused) != TX_PLACES);
 }
 
 /* --- errors --- */
 
-/* The transmit buffers are taken back before the queues are emptied: nothing of them may leave after a
- * restart. */
-static void hold_off(void)
-{
-    ecan1.held = true;
-    C1TR01CON = TX_ENABLE | 3;
-    C1TR23CON = TX_ENABLE | 2;
-    C1TR45CON = TX_ENABLE | 1;
-    C1TR67CON = TX_ENABLE;
-    C1CTRL1bits.REQOP = MODE_DISABLED; /* keeps the error counters */
-    for (uint8_t priority = 0; priority < PRIORITIES; priority++) {
-        ring_t *ring = &ecan1.tx_rings[priority];
-        ecan1.tx_failed += ring_count(ring);
-        ring->tail = ring->head;
-        ecan1.loaded[priority] = false;
-    }
-}
-
 void hal_can_restart(hal_can_t *can)
 {
-    unsigned int saved;
-    PART_LOCK(saved);
-    if (can->held) {
-        can->held = false;
+    const unsigned int saved = sys_lock();
+    if (can->health.state == HAL_CAN_BUS_OFF) {
+        can->health.state = HAL_CAN_ACTIVE;
         C1CTRL1bits.REQOP = MODE_NORMAL;
     }
-    PART_UNLOCK(saved);
-}
-
-/* Two words that the handler changes: read until two readings agree. */
-static uint32_t read_counter(const volatile uint32_t *counter)
-{
-    uint32_t first;
-    uint32_t second = *counter;
-    do {
-        first = second;
-        second = *counter;
-    } while (first != second);
-    return first;
+    sys_unlock(saved);
 }
 
 hal_can_health_t hal_can_health(const hal_can_t *can)
 {
+    const unsigned int saved = sys_lock(); /* counters of two words */
+    hal_can_health_t health = can->health;
+    sys_unlock(saved);
     const uint16_t flags = C1INTF;
     const uint16_t counters = C1EC;
-    hal_can_health_t health = {.state = HAL_CAN_ACTIVE,
-                               .tx_errors = (uint8_t)(counters >> 8),
-                               .rx_errors = (uint8_t)counters,
-                               .rx_overruns = read_counter(&can->rx_overruns),
-                               .tx_failed = read_counter(&can->tx_failed)};
-    if (can->down) {
-        health.state = HAL_CAN_DOWN;
-    } else if (can->held || (flags & INTF_TXBO) != 0) {
+    health.tx_errors = (uint8_t)(counters >> 8);
+    health.rx_errors = (uint8_t)counters;
+    if (health.state == HAL_CAN_ACTIVE && (flags & INTF_TXBO) != 0) {
         health.state = HAL_CAN_BUS_OFF;
-    } else if ((flags & (INTF_TXBP | INTF_RXBP)) != 0) {
+    } else if (health.state == HAL_CAN_ACTIVE && (flags & (INTF_TXBP | INTF_RXBP)) != 0) {
         health.state = HAL_CAN_PASSIVE;
     }
     return health;
@@ -505,16 +414,19 @@ void PART_HANDLER _C1Interrupt(void)
     const uint16_t flags = C1INTF & INTF_FLAGS;
     C1INTF = (uint16_t)~flags;
     if ((flags & INTF_RBOV) != 0) {
-        count_overflows();
+        count_overflows(&C1RXOVF1);
+        count_overflows(&C1RXOVF2);
     }
     drain_fifo();
     if ((flags & INTF_IVR) != 0 && (uint8_t)(ecan1.errors_seen - ecan1.errors_told) != UINT8_MAX) {
         ecan1.errors_seen++;
     }
-    if ((flags & INTF_ERR) != 0 && (C1INTF & INTF_TXBO) != 0 && !ecan1.held) {
-        hold_off();
+    if ((flags & INTF_ERR) != 0 && (C1INTF & INTF_TXBO) != 0) {
+        drop_all();
+        ecan1.health.state = HAL_CAN_BUS_OFF;
+        C1CTRL1bits.REQOP = MODE_DISABLED; /* keeps the error counters */
     }
-    if ((flags & INTF_TB) != 0 && !ecan1.held) {
+    if ((flags & INTF_TB) != 0) {
         advance_tx();
     }
 }

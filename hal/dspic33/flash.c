@@ -2,19 +2,25 @@
 
 #include "part.h"
 
-bool flash_erase(uint32_t address)
+bool flash_erase(uint16_t at)
 {
-    return part_flash_erase(address);
+    return part_flash_erase(at);
 }
 
-bool flash_program(uint32_t address, uint32_t first, uint32_t second)
+bool flash_program(uint16_t at, uint16_t first, uint16_t second, uint16_t upper)
 {
-    return part_flash_pair(address, first, second);
+    return part_flash_pair(at, first, second, upper);
 }
 
-uint32_t flash_read(uint32_t address)
+uint16_t flash_read(uint16_t at)
 {
-    TBLPAG = (uint16_t)(address >> 16);
-    const uint16_t low = __builtin_tblrdl((uint16_t)address);
-    return (uint32_t)(__builtin_tblrdh((uint16_t)address) & 0xFFu) << 16 | low;
+    TBLPAG = PART_FLASH_STORE_AT >> 16;
+    return __builtin_tblrdl(at);
+}
+
+uint16_t flash_read_upper(uint16_t at)
+{
+    TBLPAG = PART_FLASH_STORE_AT >> 16;
+    const uint16_t second = __builtin_tblrdh((uint16_t)(at + 2u));
+    return (uint16_t)(second << 8 | (__builtin_tblrdh(at) & 0xFFu));
 }

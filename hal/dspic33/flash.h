@@ -1,19 +1,21 @@
-/* The part's own program flash, as instructions of 24 bits. Addresses count by two; each call stops the
- * processor for as long as it takes (part.h). Main loop only. */
+/* The 64 KB of the part's own program flash in which the storage stands (PART_FLASH_STORE_AT), as
+ * instructions of 24 bits. Addresses are their lower 16 bits and count by two; flash_erase and flash_program
+ * stop the processor for as long as they take (part.h). Main loop only. */
 #ifndef FLASH_H
 #define FLASH_H
 
 #include <stdbool.h>
 #include <stdint.h>
 
-#define FLASH_ERASED 0xFFFFFFuL
+/* Erases the page that begins at this address: all bits become 1. False: the part reports an error. */
+bool flash_erase(uint16_t at);
 
-/* Erases the page that begins at address. False: the part reports an error. */
-bool flash_erase(uint32_t address);
+/* Programs two erased instructions, the first at a multiple of 4: their lower 16 bits, and the upper 8 bits
+ * of both, the first one's in the lower half. */
+bool flash_program(uint16_t at, uint16_t first, uint16_t second, uint16_t upper);
 
-/* Programs two erased instructions, the first at a multiple of 4. */
-bool flash_program(uint32_t address, uint32_t first, uint32_t second);
-
-uint32_t flash_read(uint32_t address);
+/* The lower 16 bits of an instruction, and the upper 8 bits of two as flash_program takes them. */
+uint16_t flash_read(uint16_t at);
+uint16_t flash_read_upper(uint16_t at);
 
 #endif

@@ -3,7 +3,7 @@
  *
  * How long each takes at most, entry and exit included, stands with it: cycles that a simulator of the EP
  * part counted, compiled with -O1, and their time at 40 MIPS. The smaller part needs fewer: its registers are
- * read in one cycle, not two. Those of traps end in a reset. */
+ * read in one cycle, not two. */
 #ifndef HANDLERS_H
 #define HANDLERS_H
 
@@ -15,16 +15,8 @@ void PART_HANDLER _U1RXInterrupt(void);
 void PART_HANDLER _U1TXInterrupt(void);
 void PART_HANDLER _MI2C1Interrupt(void);
 
-/* Traps, and what has no handler. */
-void PART_HANDLER _OscillatorFail(void);
-void PART_HANDLER _AddressError(void);
-void PART_HANDLER _StackError(void);
-void PART_HANDLER _MathError(void);
-void PART_HANDLER _DMACError(void);
+/* For every trap and every interrupt without a handler, by the vendor's linker scripts: written down, then
+ * the program starts again. No application code can go on after one of them. */
 void PART_HANDLER _DefaultInterrupt(void);
-#if PART_GENERIC_TRAPS
-void PART_HANDLER _HardTrapError(void);
-void PART_HANDLER _SoftTrapError(void);
-#endif
 
 #endif

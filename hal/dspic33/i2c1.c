@@ -15,25 +15,25 @@ enum {
     CYCLES_OF_ROUND = 4 /* at least, of the wait below */
 };
 
+/* What was asked of the module last. */
 typedef enum {
     IDLE,
-    STARTED,
+    STARTED, /* or started again, to read */
     SENT,
-    RESTARTED,
-    SENT_AGAIN,
+    SENT_TO_READ, /* the address */
     RECEIVED,
     ACKNOWLEDGED,
     STOPPED,
     COLLIDED /* the module has let the bus go; a device may still drive it */
 } i2c1_state_t;
 
+/* Words: the compiler reaches a byte less easily. */
 typedef struct {
-    volatile uint8_t state; /* i2c1_state_t: what was asked of the module last */
-    volatile int8_t result; /* i2c1_status_t */
-    int8_t outcome;         /* becomes the result after the stop */
-    uint8_t device;
-    uint8_t out_left;
-    uint8_t in_left;
+    volatile uint16_t state;       /* i2c1_state_t */
+    volatile i2c1_status_t result; /* of the last transfer; holds when it is over */
+    uint16_t device;
+    uint16_t out_left;
+    uint16_t in_left;
     const uint8_t *out;
     uint8_t *in;
     uint32_t started_ms;
@@ -102,7 +102,6 @@ bool i2c1_start(uint8_t device, const uint8_t *out, uint8_t out_size, uint8_t *i
     i2c1.in = in;
     i2c1.in_left = in_size;
     i2c1.started_ms = hal_clock_ms();
-    i2c1.result = I2C1_BUSY;
     i2c1.state = STARTED;
     I2C1CONbits.SEN = 1;
     return true;
@@ -110,21 +109,36 @@ bool i2c1_start(uint8_t device, const uint8_t *out, uint8_t out_size, uint8_t *i
 
 i2c1_status_t i2c1_status(void)
 {
-    if (i2c1.state == COLLIDED || (i2c1.result == I2C1_BUSY && hal_clock_ms() - i2c1.started_ms > HANGS_MS)) {
-        recover();
-        i2c1.state = IDLE;
-        i2c1.result = I2C1_FAILED;
+    if (i2c1.state == IDLE) {
+        return i2c1.result;
     }
-    return (i2c1_status_t)i2c1.result;
+    if (i2c1.state != COLLIDED && hal_clock_ms() - i2c1.started_ms <= HANGS_MS) {
+        return I2C1_BUSY;
+    }
+    recover();
+    i2c1.state = IDLE;
+    i2c1.result = I2C1_FAILED;
+    return I2C1_FAILED;
 }
 
 /* --- the handler's steps; each returns what it asked the module for --- */
 
-static i2c1_state_t stop(i2c1_status_t outcome)
+static i2c1_state_t stop(i2c1_status_t result)
 {
-    i2c1.outcome = (int8_t)outcome;
+    i2c1.result = result;
     I2C1CONbits.PEN = 1;
     return STOPPED;
+}
+
+static i2c1_state_t send_address(void)
+{
+    const uint16_t address = (uint16_t)(i2c1.device << 1);
+    if (i2c1.out_left == 0 && i2c1.in_left != 0) {
+        I2C1TRN = address | 1u;
+        return SENT_TO_READ;
+    }
+    I2C1TRN = address;
+    return SENT;
 }
 
 static i2c1_state_t send_next(void)
@@ -136,7 +150,7 @@ static i2c1_state_t send_next(void)
     }
     if (i2c1.in_left != 0) {
         I2C1CONbits.RSEN = 1;
-        return RESTARTED;
+        return STARTED;
     }
     return stop(I2C1_DONE);
 }
@@ -150,45 +164,36 @@ static i2c1_state_t receive_next(void)
     return RECEIVED;
 }
 
+/* The last byte is not acknowledged: the device lets go. */
 static i2c1_state_t take_byte(void)
 {
     *i2c1.in++ = (uint8_t)I2C1RCV;
     i2c1.in_left--;
-    I2C1CONbits.ACKDT = i2c1.in_left == 0; /* the last byte is not acknowledged: the device lets go */
+    I2C1CONbits.ACKDT = 0;
+    if (i2c1.in_left == 0) {
+        I2C1CONbits.ACKDT = 1;
+    }
     I2C1CONbits.ACKEN = 1;
     return ACKNOWLEDGED;
 }
 
-static i2c1_state_t send_address(i2c1_state_t next, uint8_t read)
-{
-    I2C1TRN = (uint16_t)(i2c1.device << 1 | read);
-    return next;
-}
-
 /* What follows the step that was done. An acknowledgement is looked at here and now: it may be gone after a
  * stop (erratum). */
-static i2c1_state_t next_step(void)
+static i2c1_state_t next_step(i2c1_state_t state)
 {
-    switch ((i2c1_state_t)i2c1.state) {
-    case STARTED:
-        return send_address(i2c1.out_left == 0 && i2c1.in_left != 0 ? SENT_AGAIN : SENT,
-                            i2c1.out_left == 0 && i2c1.in_left != 0);
-    case SENT:
-        return I2C1STATbits.ACKSTAT ? stop(I2C1_NO_ANSWER) : send_next();
-    case RESTARTED:
-        return send_address(SENT_AGAIN, 1);
-    case SENT_AGAIN:
-        return I2C1STATbits.ACKSTAT ? stop(I2C1_NO_ANSWER) : receive_next();
-    case RECEIVED:
-        return take_byte();
-    case ACKNOWLEDGED:
-        return receive_next();
-    case STOPPED:
-        i2c1.result = i2c1.outcome;
-        return IDLE;
-    default:
-        return IDLE;
+    if (state == STARTED) {
+        return send_address();
     }
+    if (state == RECEIVED) {
+        return take_byte();
+    }
+    if ((state == SENT || state == SENT_TO_READ) && I2C1STATbits.ACKSTAT) {
+        return stop(I2C1_NO_ANSWER);
+    }
+    if (state == SENT) {
+        return send_next();
+    }
+    return state == SENT_TO_READ || state == ACKNOWLEDGED ? receive_next() : IDLE;
 }
 
 /* At most 138 cycles, 3.5 us. */
@@ -199,6 +204,6 @@ void PART_HANDLER _MI2C1Interrupt(void)
         I2C1STAT = 0;
         i2c1.state = COLLIDED;
     } else {
-        i2c1.state = (uint8_t)next_step();
+        i2c1.state = next_step((i2c1_state_t)i2c1.state);
     }
 }

@@ -13,11 +13,10 @@ enum {
     READ_MAX = 64   /* bytes of one transfer */
 };
 
-typedef enum { IDLE, SENDING, WRITING, FAILED } nvm_state_t;
-
 struct hal_nvm {
-    uint8_t state;    /* nvm_state_t */
-    uint32_t sent_ms; /* when the last page was sent, or the memory was opened */
+    hal_nvm_status_t status;
+    bool sent;        /* while busy: the page, so that the device is asked whether it has written it */
+    uint32_t sent_ms; /* when that was, or when the memory was opened */
     uint8_t bytes[ADDRESS_BYTES + HAL_NVM_PAGE];
 };
 
@@ -25,7 +24,8 @@ static struct hal_nvm nvm;
 
 hal_nvm_t *nvm_open(void)
 {
-    nvm.state = IDLE;
+    i2c1_open();
+    nvm.status = HAL_NVM_IDLE;
     nvm.sent_ms = hal_clock_ms();
     return &nvm;
 }
@@ -41,10 +41,12 @@ static i2c1_status_t wait_for_bus(void)
     return status;
 }
 
-static void set_address(uint8_t *bytes, uint16_t address)
+/* Starts a transfer: the address, and the bytes of a page that stand behind it. */
+static bool start(hal_nvm_t *self, uint16_t address, uint16_t out_size, uint8_t *in, uint16_t in_size)
 {
-    bytes[0] = (uint8_t)(address >> 8);
-    bytes[1] = (uint8_t)address;
+    self->bytes[0] = (uint8_t)(address >> 8);
+    self->bytes[1] = (uint8_t)address;
+    return i2c1_start(EEPROM, self->bytes, (uint8_t)(ADDRESS_BYTES + out_size), in, (uint8_t)in_size);
 }
 
 /* After a reset of the processor alone the EEPROM may still be writing, and does not answer before it is
@@ -56,16 +58,15 @@ static bool may_be_writing(const hal_nvm_t *self, i2c1_status_t status)
 
 bool hal_nvm_read(hal_nvm_t *self, uint16_t address, uint8_t *bytes, uint16_t size)
 {
-    if ((uint32_t)address + size > HAL_NVM_SIZE) {
+    if (address > HAL_NVM_SIZE || size > HAL_NVM_SIZE - address) {
         return false;
     }
     while (hal_nvm_status(self) == HAL_NVM_BUSY) {
         Idle();
     }
     while (size != 0) {
-        const uint8_t part = size < READ_MAX ? (uint8_t)size : READ_MAX;
-        set_address(self->bytes, address);
-        if (!i2c1_start(EEPROM, self->bytes, ADDRESS_BYTES, bytes, part)) {
+        const uint16_t part = size < READ_MAX ? size : READ_MAX;
+        if (!start(self, address, 0, bytes, part)) {
             return false;
         }
         const i2c1_status_t status = wait_for_bus();
@@ -84,16 +85,17 @@ bool hal_nvm_read(hal_nvm_t *self, uint16_t address, uint8_t *bytes, uint16_t si
 
 bool hal_nvm_write(hal_nvm_t *self, uint16_t address, const uint8_t *bytes, uint16_t size)
 {
-    const bool in_page = size >= 1 && size <= HAL_NVM_PAGE && address % HAL_NVM_PAGE + size <= HAL_NVM_PAGE;
-    if (!in_page || (uint32_t)address + size > HAL_NVM_SIZE || hal_nvm_status(self) == HAL_NVM_BUSY) {
+    /* a size of 0 is more than all here */
+    if ((uint16_t)(size - 1u) >= HAL_NVM_PAGE - address % HAL_NVM_PAGE || address >= HAL_NVM_SIZE ||
+        hal_nvm_status(self) == HAL_NVM_BUSY) {
         return false;
     }
-    set_address(self->bytes, address);
     memcpy(&self->bytes[ADDRESS_BYTES], bytes, size);
-    if (!i2c1_start(EEPROM, self->bytes, (uint8_t)(ADDRESS_BYTES + size), NULL, 0)) {
+    if (!start(self, address, size, NULL, 0)) {
         return false;
     }
-    self->state = SENDING;
+    self->status = HAL_NVM_BUSY;
+    self->sent = false;
     return true;
 }
 
@@ -101,22 +103,19 @@ bool hal_nvm_write(hal_nvm_t *self, uint16_t address, const uint8_t *bytes, uint
  * last answer and asks again if there was none. */
 hal_nvm_status_t hal_nvm_status(hal_nvm_t *self)
 {
-    if (self->state == IDLE || self->state == FAILED) {
-        return self->state == IDLE ? HAL_NVM_IDLE : HAL_NVM_FAILED;
-    }
     const i2c1_status_t status = i2c1_status();
-    if (status == I2C1_BUSY) {
-        return HAL_NVM_BUSY;
+    if (self->status != HAL_NVM_BUSY || status == I2C1_BUSY) {
+        return self->status;
     }
-    if (self->state == SENDING && status == I2C1_DONE) {
-        self->state = WRITING;
-        self->sent_ms = hal_clock_ms();
-    } else if (self->state == WRITING && status == I2C1_DONE) {
-        self->state = IDLE;
+    if (self->sent && status == I2C1_DONE) {
+        self->status = HAL_NVM_IDLE;
         return HAL_NVM_IDLE;
-    } else if (self->state == SENDING || status != I2C1_NO_ANSWER ||
-               hal_clock_ms() - self->sent_ms > WRITES_MS) {
-        self->state = FAILED;
+    }
+    if (status == I2C1_DONE) {
+        self->sent = true;
+        self->sent_ms = hal_clock_ms();
+    } else if (!self->sent || !may_be_writing(self, status)) {
+        self->status = HAL_NVM_FAILED;
         return HAL_NVM_FAILED;
     }
     (void)i2c1_start(EEPROM, NULL, 0, NULL, 0);

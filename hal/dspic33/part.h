@@ -47,10 +47,4 @@ enum {
     PART_LEVEL_ALL = 7 /* as the processor's own level: no handler runs */
 };
 
-/* Runs no handler from here to PART_UNLOCK; nests. A handler that becomes due meanwhile runs afterwards.
- * saved is an unsigned int of the caller's. Clearing an enable bit would not do: a handler that is just
- * becoming due still runs. */
-#define PART_LOCK(saved) SET_AND_SAVE_CPU_IPL(saved, PART_LEVEL_ALL)
-#define PART_UNLOCK(saved) RESTORE_CPU_IPL(saved)
-
 #endif

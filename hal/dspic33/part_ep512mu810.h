@@ -37,15 +37,17 @@ static inline void part_enable_interrupts(void)
     INTCON2bits.GIE = 1;
 }
 
-/* Two traps more than the smaller part has. */
-#define PART_GENERIC_TRAPS 1
+/* Nothing is kept from the linker: it would spread the program around it, out of the reach of its calls. The
+ * program begins at 200h, and its budget ends far below. */
+#define PART_RESERVED(at) __attribute__((unused))
 
-/* Program flash: a page of 1024 instructions, two instructions are programmed together. */
+/* Program flash: a page of 1024 instructions is erased at once (the processor stands still for up to 23 ms),
+ * two instructions are programmed together (52 us). Addresses count by two. */
 #define PART_FLASH_PAGE 0x800uL
-#define PART_FLASH_ERASE_US 22900u
-#define PART_FLASH_PAIR_US 52u
 #define PART_FLASH_STORE_AT 0x40000uL
-#define PART_FLASH_STORE_PAGES 15u
+#ifndef PART_FLASH_STORE_PAGES
+#define PART_FLASH_STORE_PAGES 15u /* of one area */
+#endif
 #define PART_SERIAL_AT 0x54800uL
 
 /* Erratum: while the processor stands still for a flash operation no interrupt may be enabled. */
@@ -63,25 +65,27 @@ static inline bool part_flash_run(void)
     return good;
 }
 
-static inline bool part_flash_erase(uint32_t address)
+static inline bool part_flash_start(uint16_t at, uint16_t operation)
 {
-    NVMADRU = (uint16_t)(address >> 16);
-    NVMADR = (uint16_t)address;
-    NVMCON = 0x4003;
+    NVMADRU = PART_FLASH_STORE_AT >> 16;
+    NVMADR = at;
+    NVMCON = operation;
     return part_flash_run();
 }
 
-static inline bool part_flash_pair(uint32_t address, uint32_t first, uint32_t second)
+static inline bool part_flash_erase(uint16_t at)
+{
+    return part_flash_start(at, 0x4003);
+}
+
+static inline bool part_flash_pair(uint16_t at, uint16_t first, uint16_t second, uint16_t upper)
 {
     TBLPAG = 0xFA; /* the write latches */
-    __builtin_tblwtl(0, (uint16_t)first);
-    __builtin_tblwth(0, (uint16_t)(first >> 16));
-    __builtin_tblwtl(2, (uint16_t)second);
-    __builtin_tblwth(2, (uint16_t)(second >> 16));
-    NVMADRU = (uint16_t)(address >> 16);
-    NVMADR = (uint16_t)address;
-    NVMCON = 0x4001;
-    return part_flash_run();
+    __builtin_tblwtl(0, first);
+    __builtin_tblwth(0, upper & 0xFFu);
+    __builtin_tblwtl(2, second);
+    __builtin_tblwth(2, upper >> 8);
+    return part_flash_start(at, 0x4001);
 }
 
 #endif

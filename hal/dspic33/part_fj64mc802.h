@@ -30,17 +30,21 @@
 /* There is no switch for all interrupts. */
 static inline void part_enable_interrupts(void) {}
 
-#define PART_GENERIC_TRAPS 0
+/* Instructions of flash that the linker is to leave alone: a constant array of uint16_t, one each. Counted as
+ * used, and not programmed. */
+#ifndef PART_RESERVED
+#define PART_RESERVED(at) __attribute__((space(prog), address(at), noload, used, keep))
+#endif
 
-/* Program flash: a page of 512 instructions is erased at once (20 ms at least, the processor stands still), a
- * word is programmed alone (45 us). Addresses count by two. */
+/* Program flash: a page of 512 instructions is erased at once (the processor stands still for up to 26 ms), a
+ * word is programmed alone (50 us). Addresses count by two. */
 #define PART_FLASH_PAGE 0x400uL
-#define PART_FLASH_ERASE_US 26200u
-#define PART_FLASH_PAIR_US 100u
-/* The last pages: two areas for storage behind 48 KB of code, and the serial number's page. */
-#define PART_FLASH_STORE_AT 0x8000uL
-#define PART_FLASH_STORE_PAGES 5u /* of one area */
+/* The last page holds the serial number, two areas for storage stand right in front of it. */
 #define PART_SERIAL_AT 0xA800uL
+#ifndef PART_FLASH_STORE_PAGES
+#define PART_FLASH_STORE_PAGES 3u /* of one area; firmware: storage_pages in CMakeLists.txt */
+#endif
+#define PART_FLASH_STORE_AT (PART_SERIAL_AT - 2u * PART_FLASH_STORE_PAGES * PART_FLASH_PAGE)
 
 static inline bool part_flash_run(void)
 {
@@ -53,27 +57,27 @@ static inline bool part_flash_run(void)
     return good;
 }
 
-static inline bool part_flash_erase(uint32_t address)
+static inline bool part_flash_erase(uint16_t at)
 {
     NVMCON = 0x4042;
-    TBLPAG = (uint16_t)(address >> 16);
-    __builtin_tblwtl((uint16_t)address, 0xFFFF); /* any write tells the page */
+    TBLPAG = PART_FLASH_STORE_AT >> 16;
+    __builtin_tblwtl(at, 0xFFFF); /* any write tells the page */
     return part_flash_run();
 }
 
-static inline bool part_flash_word(uint32_t address, uint32_t word)
+static inline bool part_flash_word(uint16_t at, uint16_t low, uint16_t upper)
 {
     NVMCON = 0x4003;
-    TBLPAG = (uint16_t)(address >> 16);
-    __builtin_tblwtl((uint16_t)address, (uint16_t)word);
-    __builtin_tblwth((uint16_t)address, (uint16_t)(word >> 16));
+    TBLPAG = PART_FLASH_STORE_AT >> 16;
+    __builtin_tblwtl(at, low);
+    __builtin_tblwth(at, upper);
     return part_flash_run();
 }
 
-/* Two instructions, the first at a multiple of 4. */
-static inline bool part_flash_pair(uint32_t address, uint32_t first, uint32_t second)
+static inline bool part_flash_pair(uint16_t at, uint16_t first, uint16_t second, uint16_t upper)
 {
-    return part_flash_word(address, first) && part_flash_word(address + 2, second);
+    return part_flash_word(at, first, upper & 0xFFu) &&
+           part_flash_word((uint16_t)(at + 2u), second, upper >> 8);
 }
 
 #endif

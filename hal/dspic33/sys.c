@@ -2,7 +2,7 @@
 
 #include <stddef.h>
 
-#include "hal_clock.h"
+#include "handlers.h"
 #include "part.h"
 
 enum { FAULT_MAGIC = 0x5F0D };
@@ -26,26 +26,25 @@ static sys_fault_t sys_last_fault PART_KEPT;
 static uint16_t sys_noise[16] PART_KEPT;
 
 static sys_reset_t sys_cause;
-static bool sys_faulted;
 static uint32_t sys_kicked_ms;
 
 /* Two instructions near the end of flash, written by tools/flash --serial; erased: no number. */
-static const uint16_t sys_serial_words[2]
-    __attribute__((space(prog), address(PART_SERIAL_AT), noload, unused));
+static const uint16_t sys_serial_words[2] PART_RESERVED(PART_SERIAL_AT);
 
 void sys_start(void)
 {
     const uint16_t flags = RCON;
     RCON = flags & (uint16_t) ~(RCON_CAUSES | RCON_SLEEP_IDLE);
     part_enable_interrupts();
-    if ((flags & RCON_POR) != 0) {
-        sys_last_fault.magic = 0;
+    if ((flags & RCON_POR) != 0 || sys_last_fault.magic != FAULT_MAGIC) {
+        sys_last_fault.magic = FAULT_MAGIC;
+        sys_last_fault.count = 0;
+        sys_last_fault.kind = SYS_FAULT_NONE;
     }
-    if (sys_last_fault.magic != FAULT_MAGIC) {
-        sys_last_fault = (sys_fault_t){.magic = FAULT_MAGIC};
+    if ((flags & RCON_SWR) == 0) { /* what sys_fail wrote down is not why */
+        sys_last_fault.kind = SYS_FAULT_NONE;
     }
-    sys_faulted = sys_last_fault.kind != SYS_FAULT_NONE && (flags & RCON_SWR) != 0;
-    if (sys_faulted || (flags & RCON_TRAPR) != 0) {
+    if (sys_last_fault.kind != SYS_FAULT_NONE || (flags & RCON_TRAPR) != 0) {
         sys_cause = SYS_RESET_TRAP;
     } else if ((flags & RCON_POR) != 0) {
         sys_cause = SYS_RESET_POWER_ON;
@@ -67,7 +66,7 @@ sys_reset_t sys_reset_cause(void)
 
 const sys_fault_t *sys_fault(void)
 {
-    return sys_faulted ? &sys_last_fault : NULL;
+    return sys_last_fault.kind != SYS_FAULT_NONE ? &sys_last_fault : NULL;
 }
 
 void sys_fail(sys_fault_kind_t kind)
@@ -78,6 +77,11 @@ void sys_fail(sys_fault_kind_t kind)
     PART_RESET();
 }
 
+void PART_HANDLER _DefaultInterrupt(void)
+{
+    sys_fail(SYS_FAULT_HANDLER);
+}
+
 void sys_kick(uint32_t now_ms)
 {
     if (now_ms != sys_kicked_ms) {
@@ -86,35 +90,43 @@ void sys_kick(uint32_t now_ms)
     }
 }
 
-/* An enabled interrupt ends the idle state also while its handler may not run; it runs after PART_UNLOCK. */
-void sys_idle(bool (*has_work)(void *ctx), void *ctx)
+unsigned int sys_lock(void)
 {
     unsigned int saved;
-    PART_LOCK(saved);
+    SET_AND_SAVE_CPU_IPL(saved, PART_LEVEL_ALL);
+    return saved;
+}
+
+void sys_unlock(unsigned int saved)
+{
+    RESTORE_CPU_IPL(saved);
+}
+
+/* An enabled interrupt ends the idle state also while its handler may not run; it runs after sys_unlock. */
+void sys_idle(bool (*has_work)(void *ctx), void *ctx)
+{
+    const unsigned int saved = sys_lock();
     if (!has_work(ctx)) {
         Idle();
     }
-    PART_UNLOCK(saved);
+    sys_unlock(saved);
 }
 
-/* FNV-1a over the noise; stirred on each call, so that it never gives the same number twice. */
+/* FNV-1a over the words of noise; stirred on each call, so that it never gives the same number twice. */
 static uint32_t draw(void)
 {
     uint32_t hash = 2166136261uL;
     sys_noise[0]++;
     sys_noise[1] ^= TMR1;
-    sys_noise[2] ^= (uint16_t)hal_clock_ms();
     for (uint8_t i = 0; i < 16; i++) {
-        hash = (hash ^ (sys_noise[i] & 0xFFu)) * 16777619uL;
-        hash = (hash ^ sys_noise[i] >> 8) * 16777619uL;
+        hash = (hash ^ sys_noise[i]) * 16777619uL;
     }
-    sys_noise[3] ^= (uint16_t)hash;
+    sys_noise[2] ^= (uint16_t)hash;
     return hash;
 }
 
 uint32_t hal_sys_serial(void)
 {
-    (void)sys_serial_words;
     TBLPAG = (uint16_t)(PART_SERIAL_AT >> 16);
     const uint16_t low = __builtin_tblrdl((uint16_t)PART_SERIAL_AT);
     const uint16_t high = __builtin_tblrdl((uint16_t)PART_SERIAL_AT + 2u);

@@ -1,4 +1,4 @@
-/* Reset, watchdog, idle, serial number (hal_sys.h). */
+/* Reset, watchdog, handlers off, idle, serial number (hal_sys.h). */
 #ifndef SYS_H
 #define SYS_H
 
@@ -21,21 +21,16 @@ typedef enum {
 /* What stopped the program before the last restart. */
 typedef enum {
     SYS_FAULT_NONE = 0,
-    SYS_FAULT_OSCILLATOR = 1, /* the crystal has failed */
-    SYS_FAULT_ADDRESS = 2,
-    SYS_FAULT_STACK = 3,
-    SYS_FAULT_MATH = 4,
-    SYS_FAULT_DMA = 5,
-    SYS_FAULT_OTHER = 6,   /* hard or soft trap of the EP part */
-    SYS_FAULT_HANDLER = 7, /* an interrupt that nobody handles */
-    SYS_FAULT_CRYSTAL = 8  /* the crystal did not start */
+    SYS_FAULT_HANDLER = 1, /* a trap, or an interrupt that nobody handles */
+    SYS_FAULT_CRYSTAL = 2  /* the crystal did not start */
 } sys_fault_kind_t;
 
 /* Stays in RAM over resets, not over power-off. */
 typedef struct {
     uint16_t magic; /* else this is what RAM holds after power-on */
     uint16_t kind;  /* sys_fault_kind_t */
-    uint16_t flags; /* INTCON1 at that time */
+    uint16_t flags; /* INTCON1 at that time; which trap: bit 1 oscillator, 2 stack, 3 address, 4 arithmetic,
+                       5 DMA; none of them: an interrupt, or a soft or hard trap of the EP part */
     uint16_t count; /* faults since power-on */
 } sys_fault_t;
 
@@ -54,6 +49,12 @@ void sys_fail(sys_fault_kind_t kind);
 /* Keeps the watchdog (2 s) quiet, if the clock has moved on since the last call: a main loop without a tick
  * is no healthy one. Called once in each turn of the main loop, and nowhere else. */
 void sys_kick(uint32_t now_ms);
+
+/* Runs no handler from here to sys_unlock, which gets what this returned; nests. A handler that becomes due
+ * meanwhile runs afterwards. Clearing an enable bit would not do: a handler that is just becoming due still
+ * runs. */
+unsigned int sys_lock(void);
+void sys_unlock(unsigned int saved);
 
 /* Stops the processor until the next interrupt, the tick at the latest, unless there is work already.
  * has_work is called with all handlers off, so that nothing comes between its answer and the stop. */

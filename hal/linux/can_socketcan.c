@@ -2,7 +2,6 @@
 #include <arpa/inet.h>
 #include <errno.h>
 #include <linux/can.h>
-#include <linux/can/error.h>
 #include <linux/can/raw.h>
 #include <linux/filter.h>
 #include <linux/sock_diag.h>
@@ -15,6 +14,7 @@
 
 #include "can_link.h"
 #include "linux_can_backend.h"
+#include "linux_can_frame.h"
 #include "oneshot.h"
 
 #define BATCH_MAX 32
@@ -258,57 +258,6 @@ static void on_event(void *ctx, uint32_t events)
 
 /* --- frames --- */
 
-static void count_error(hal_can_health_t *health, const struct canfd_frame *in)
-{
-    if ((in->can_id & CAN_ERR_CRTL) != 0) {
-        if ((in->data[1] & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
-            health->state = HAL_CAN_PASSIVE;
-        } else if ((in->data[1] &
-                    (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_ACTIVE)) != 0) {
-            health->state = HAL_CAN_ACTIVE;
-        }
-        health->rx_overruns += (in->data[1] & CAN_ERR_CRTL_RX_OVERFLOW) != 0 ? 1u : 0u;
-        health->tx_failed += (in->data[1] & CAN_ERR_CRTL_TX_OVERFLOW) != 0 ? 1u : 0u;
-    }
-    if ((in->can_id & (CAN_ERR_CRTL | CAN_ERR_CNT)) != 0) {
-        health->tx_errors = in->data[6];
-        health->rx_errors = in->data[7];
-    }
-    health->tx_failed += (in->can_id & CAN_ERR_TX_TIMEOUT) != 0 ? 1u : 0u;
-    if ((in->can_id & CAN_ERR_BUSOFF) != 0) {
-        health->state = HAL_CAN_BUS_OFF;
-    } else if ((in->can_id & CAN_ERR_RESTARTED) != 0) {
-        health->state = HAL_CAN_ACTIVE;
-        health->tx_errors = 0;
-        health->rx_errors = 0;
-    }
-}
-
-static can_frame_kind_t kind_of(const struct canfd_frame *in, unsigned size)
-{
-    if (size != CAN_MTU) {
-        return CAN_FRAME_FD;
-    }
-    if ((in->can_id & CAN_ERR_FLAG) != 0) {
-        return CAN_FRAME_ERROR;
-    }
-    if ((in->can_id & CAN_RTR_FLAG) != 0) {
-        return CAN_FRAME_REMOTE;
-    }
-    return (in->can_id & CAN_EFF_FLAG) != 0 ? CAN_FRAME_EXTENDED : CAN_FRAME_BASE;
-}
-
-static void translate(const struct canfd_frame *in, unsigned size, can_frame_t *out)
-{
-    *out = (can_frame_t){0};
-    out->kind = (uint8_t)kind_of(in, size);
-    out->id = out->kind == CAN_FRAME_BASE ? (uint16_t)(in->can_id & CAN_SFF_MASK) : 0;
-    out->dlc = in->len > CAN_FRAME_DATA_MAX ? (uint8_t)CAN_FRAME_DATA_MAX : in->len;
-    if (out->kind != CAN_FRAME_REMOTE) {
-        memcpy(out->data, in->data, out->dlc);
-    }
-}
-
 /* The socket counts what did not fit; asked once after each backlog, so that a quiet bus costs nothing. */
 static void count_overruns(can_socketcan_t *can)
 {
@@ -346,9 +295,11 @@ static size_t can_socketcan_receive(hal_can_t *base, can_frame_t *frames, size_t
         count_overruns(can);
     }
     for (size_t i = 0; i < received; i++) {
-        translate(&can->received[i], can->messages[i].msg_len, &frames[i]);
+        const struct canfd_frame *in = &can->received[i];
+        linux_can_frame_decode(in->can_id, can->messages[i].msg_len != CAN_MTU, in->len, in->data,
+                               &frames[i]);
         if (frames[i].kind == CAN_FRAME_ERROR) {
-            count_error(&base->health, &can->received[i]);
+            linux_can_frame_note_error(in->can_id, in->data, &base->health);
         }
     }
     return received;

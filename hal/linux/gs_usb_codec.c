@@ -1,8 +1,9 @@
 #include "gs_usb_codec.h"
 
 #include <linux/can.h>
-#include <linux/can/error.h>
 #include <string.h>
+
+#include "linux_can_frame.h"
 
 #define FORMAT_LITTLE_ENDIAN 0x0000beefu
 #define FLAG_OVERFLOW 0x01u
@@ -131,67 +132,16 @@ bool gs_usb_codec_decode_frame(const uint8_t *bytes, size_t size, gs_usb_codec_f
     return true;
 }
 
-static can_frame_kind_t kind_of(const gs_usb_codec_frame_t *in)
-{
-    if (in->fd) {
-        return CAN_FRAME_FD;
-    }
-    if ((in->can_id & CAN_ERR_FLAG) != 0) {
-        return CAN_FRAME_ERROR;
-    }
-    if ((in->can_id & CAN_RTR_FLAG) != 0) {
-        return CAN_FRAME_REMOTE;
-    }
-    return (in->can_id & CAN_EFF_FLAG) != 0 ? CAN_FRAME_EXTENDED : CAN_FRAME_BASE;
-}
-
 void gs_usb_codec_to_can_frame(const gs_usb_codec_frame_t *in, can_frame_t *out)
 {
-    *out = (can_frame_t){0};
-    out->kind = (uint8_t)kind_of(in);
-    out->id = out->kind == CAN_FRAME_BASE ? (uint16_t)(in->can_id & CAN_SFF_MASK) : 0;
-    out->dlc = in->dlc > CAN_FRAME_DATA_MAX ? (uint8_t)CAN_FRAME_DATA_MAX : in->dlc;
-    if (out->kind != CAN_FRAME_REMOTE) {
-        memcpy(out->data, in->data, out->dlc);
-    }
-}
-
-/* What the controller says of itself in byte 1 of an error frame. */
-static void note_controller(uint8_t status, hal_can_health_t *health)
-{
-    if ((status & (CAN_ERR_CRTL_RX_PASSIVE | CAN_ERR_CRTL_TX_PASSIVE)) != 0) {
-        health->state = HAL_CAN_PASSIVE;
-    } else if ((status & (CAN_ERR_CRTL_RX_WARNING | CAN_ERR_CRTL_TX_WARNING | CAN_ERR_CRTL_ACTIVE)) != 0) {
-        health->state = HAL_CAN_ACTIVE;
-    }
-    health->rx_overruns += (status & CAN_ERR_CRTL_RX_OVERFLOW) != 0 ? 1u : 0u;
-    health->tx_failed += (status & CAN_ERR_CRTL_TX_OVERFLOW) != 0 ? 1u : 0u;
-}
-
-static void note_error(const gs_usb_codec_frame_t *frame, hal_can_health_t *health)
-{
-    if ((frame->can_id & CAN_ERR_CRTL) != 0) {
-        note_controller(frame->data[1], health);
-    }
-    if ((frame->can_id & (CAN_ERR_CRTL | CAN_ERR_CNT)) != 0) {
-        health->tx_errors = frame->data[6];
-        health->rx_errors = frame->data[7];
-    }
-    health->tx_failed += (frame->can_id & CAN_ERR_TX_TIMEOUT) != 0 ? 1u : 0u;
-    if ((frame->can_id & CAN_ERR_BUSOFF) != 0) {
-        health->state = HAL_CAN_BUS_OFF;
-    } else if ((frame->can_id & CAN_ERR_RESTARTED) != 0) {
-        health->state = HAL_CAN_ACTIVE;
-        health->tx_errors = 0;
-        health->rx_errors = 0;
-    }
+    linux_can_frame_decode(in->can_id, in->fd, in->dlc, in->data, out);
 }
 
 void gs_usb_codec_note(const gs_usb_codec_frame_t *frame, hal_can_health_t *health)
 {
     health->rx_overruns += frame->overflow ? 1u : 0u;
     if ((frame->can_id & CAN_ERR_FLAG) != 0) {
-        note_error(frame, health);
+        linux_can_frame_note_error(frame->can_id, frame->data, health);
     } else if (health->state == HAL_CAN_BUS_OFF) {
         health->state = HAL_CAN_ACTIVE; /* who receives has recovered, also where no error frame says so */
         health->tx_errors = 0;

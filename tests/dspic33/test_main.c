@@ -28,6 +28,7 @@ static struct {
 } request;
 
 static uint32_t bus_off_ms; /* 0: never */
+static bool line_error;     /* before the request comes a byte that is none */
 static uint32_t held_ms;    /* the controller was kept away from the bus until then */
 static unsigned inputs;     /* values that the controller's muscle input received */
 static uint8_t last_input;
@@ -88,7 +89,10 @@ static void step_world(void)
 {
     step_bus();
     step_devices();
-    if (now_ms() >= request.at_ms && request.sent < request.size) {
+    if (line_error && now_ms() >= request.at_ms) {
+        line_error = false;
+        fake_uart_receive(0, true);
+    } else if (now_ms() >= request.at_ms && request.sent < request.size) {
         fake_uart_receive(request.bytes[request.sent++], false);
     }
     if (now_ms() / 20u != sent_value) {
@@ -222,6 +226,17 @@ static void test_bus_off_is_got_over(void)
     TEST_ASSERT_UINT8_WITHIN(1, 4000 / 20 % 256, last_input);
 }
 
+/* D-API-18: what the drivers lost is told to the host, 2413h group 3. */
+static void test_the_host_sees_what_was_lost(void)
+{
+    static const uint8_t get[] = {0xFE, 0x19, 0x13, 0x24, 0x01, 0x56, 0x03, 0x00, 0x03, 0x93, 0xD1};
+    static const uint8_t lost[] = {0xFE, 0x19, 0x14, 0x24, 0x01, 0x83, 0x0F, 0x00, 0x03, 0,    0,   0,
+                                   0,    0,    0,    0,    0,    1,    0,    0,    0,    0x1D, 0x91};
+    line_error = true;
+    run(400, 100, get, sizeof get);
+    assert_answer(lost, sizeof lost);
+}
+
 /* The crystal is missing: the part restarts instead of running with a clock that CAN cannot use. */
 static void test_without_a_crystal_it_restarts(void)
 {
@@ -238,6 +253,7 @@ int main(void)
     RUN_TEST(test_no_devices);
     RUN_TEST(test_configuration_outlives_power_off);
     RUN_TEST(test_bus_off_is_got_over);
+    RUN_TEST(test_the_host_sees_what_was_lost);
     RUN_TEST(test_without_a_crystal_it_restarts);
     return UNITY_END();
 }

@@ -1,5 +1,6 @@
 """pdcpd and pdcp-node as programs: how they begin, complain and end."""
 
+import re
 import socket
 import subprocess
 from collections.abc import Callable
@@ -37,6 +38,7 @@ def assert_one_line(result: tuple[int, list[str]], *parts: str) -> None:
     status, lines = result
     assert status == 2, lines
     assert len(lines) == 1, lines
+    assert "/bin/" not in lines[0], "programs are told by their names"
     for part in parts:
         assert part in lines[0]
 
@@ -84,6 +86,13 @@ def test_pdcpd_wrong_use(arguments: list[str], parts: list[str], run: Run) -> No
 )
 def test_pdcp_node_wrong_use(arguments: list[str], parts: list[str], run: Run) -> None:
     assert_one_line(run("pdcp-node", *arguments), "pdcp-node: ", *parts)
+
+
+@pytest.mark.parametrize("program", ["pdcpd", "pdcp-node"])
+def test_version(program: str, programs: Path) -> None:
+    result = subprocess.run([programs / program, "--version"], capture_output=True, text=True, timeout=10)
+    assert result.returncode == 0
+    assert re.fullmatch(rf"{program} \d+\.\d+\.\d+\n", result.stdout)
 
 
 def test_missing_interface(run: Run, files: dict[str, Path]) -> None:

@@ -14,8 +14,9 @@
 #define no_auto_psv __used__
 #define persistent section("fake_kept")
 #define space(kind) section("fake_" #kind)
-#define address(at) __used__
-#define noload __used__
+#if defined(__dsPIC33FJ64MC802__)
+#define PART_RESERVED(at) __attribute__((unused))
+#endif
 
 volatile uint16_t *fake_register(uint16_t at);
 

@@ -284,3 +284,9 @@ def test_what_a_profile_requires(pdcp: Pdcp, columns: int) -> None:
     assert "2221h EMG amplitude > 2221h" in out and "20 to 200" in out
     assert json.loads(pdcp("profiles", "2221h", "--json")[1])["path"] == "emg.amplitude"
     assert len(json.loads(pdcp("profiles", "--json")[1])) == 106
+
+
+def test_nobody_serves_the_bus(pdcp: Pdcp) -> None:
+    """The system's reason in words, without its number."""
+    status, _, error = pdcp("dump", "-i", "socketcand", "-c", "127.0.0.1:1/limb")
+    assert (status, error) == (3, "pdcp: socketcand 127.0.0.1:1/limb: Connection refused\n")

@@ -71,13 +71,13 @@ def test_import_gives_the_same_bytes_back(pdcp: Pdcp, client: Client, tmp_path: 
     path = tmp_path / "a.yaml"
     path.write_text(YAML)
     client.data = b""
-    assert pdcp("config", "import", path) == (0, "", "")
+    assert pdcp("config", "import", path) == (0, "1 configuration stored, 24 bytes\n", "")
     assert client.data == STRING
 
 
 def test_import_from_standard_input(pdcp: Pdcp, client: Client, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "stdin", TextIOWrapper(BytesIO(b"configurations: []\n")))
-    assert pdcp("config", "import", "-") == (0, "", "")
+    assert pdcp("config", "import", "-") == (0, "0 configurations stored, 6 bytes\n", "")
     assert client.data == bytes((1, 0, 0, 15, 0, 0))
 
 

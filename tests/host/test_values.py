@@ -237,6 +237,11 @@ def test_storage_counters_are_those_of_the_header() -> None:
     assert ours == [name.removeprefix("count_") for name in names]
 
 
+def test_driver_counters_are_those_of_the_header() -> None:
+    names = enumerators("firmware/arb_port.h", "ARB_PORT_", "COUNTERS")
+    assert [name for name, _ in counters.DRIVERS.counters] == names
+
+
 def test_more_counters_than_names() -> None:
     stats = counters.name_counters(7, [1, 2])
     assert stats.name == "group 7"

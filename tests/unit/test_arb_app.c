@@ -400,7 +400,7 @@ static void test_a_stall_of_the_host_loses_no_request(void)
         answers++;
     }
     TEST_ASSERT_EQUAL(12, answers);
-    TEST_ASSERT_EQUAL(0, app.api.rx.given_up);
+    TEST_ASSERT_EQUAL(0, app.api.rx.counters[ARB_HOSTRX_GIVEN_UP]);
 }
 
 int main(void)

@@ -15,6 +15,7 @@ static int busy;           /* polls until the page is written */
 static int writes_left;    /* until one fails; -1: none does */
 static int8_t status;      /* of the page written last */
 static int32_t bad_byte;   /* its lowest bit is always 0; -1: none */
+static int32_t lost_page;  /* what is written there is taken and lost; -1: none */
 
 static uint8_t *at_address(uint16_t address, uint16_t size)
 {
@@ -43,7 +44,7 @@ static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_
     status = writes_left == 0 ? -1 : 0;
     writes_left -= writes_left >= 0 ? 1 : 0;
     busy = 1;
-    if (status == 0) {
+    if (status == 0 && address != lost_page) {
         memcpy(at_address(address, size), bytes, size);
     }
     if (bad_byte >= address && bad_byte < (int32_t)address + size) {
@@ -74,6 +75,7 @@ static void power_on(void)
     status = 0;
     writes_left = -1;
     bad_byte = -1;
+    lost_page = -1;
     arb_nvm_init(&nvm, &port);
     arb_config_init(&config, &nvm);
 }
@@ -592,6 +594,16 @@ static void test_a_byte_that_cannot_be_written_is_noticed(void)
     }
 }
 
+/* Nobody says that the header was not written, and an older one of the same string stands there. */
+static void test_a_lost_header_is_noticed(void)
+{
+    (void)save(1, 1, 0x5300);
+    (void)save(1, 1, 0x5311);
+    lost_page = ARB_NVM_CONFIG_AT;
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(1, 1, 0x5300));
+    EXPECT(1, 1, 0, 2, 1, 0, 3, 1, 0, LINK(1, 0x11), 15, 0, 0);
+}
+
 static void test_a_memory_that_hangs_ends_the_job(void)
 {
     const uint32_t before_ms = now_ms;
@@ -685,6 +697,7 @@ int main(void)
     RUN_TEST(test_done_may_start_the_next_job);
     RUN_TEST(test_a_failing_write_changes_nothing);
     RUN_TEST(test_a_byte_that_cannot_be_written_is_noticed);
+    RUN_TEST(test_a_lost_header_is_noticed);
     RUN_TEST(test_a_memory_that_hangs_ends_the_job);
     RUN_TEST(test_damage_at_run_time_is_noticed);
     RUN_TEST(test_the_memory_is_shared);

@@ -114,7 +114,7 @@ static void test_all_values_survive_and_the_pages_take_turns(void)
     for (uint8_t value = 0; value < 16; value++) {
         set(value);
         TEST_ASSERT_EQUAL(value + 1, writes);
-        TEST_ASSERT_EQUAL(value % 2, flags.page);
+        TEST_ASSERT_EQUAL(value % 2, flags.newest.area);
         power_on();
         TEST_ASSERT_EQUAL_HEX8(value, arb_flags_get(&flags));
         TEST_ASSERT_EQUAL(0, flags.damaged);
@@ -126,13 +126,13 @@ static void test_all_values_survive_and_the_pages_take_turns(void)
 static void test_the_number_of_writes_wraps(void)
 {
     set(0x01);
-    flags.sequence = 0xFFFE;
+    flags.newest.sequence = 0xFFFE;
     set(0x02);
     set(0x04);
     set(0x08);
     power_on();
     TEST_ASSERT_EQUAL_HEX8(0x08, arb_flags_get(&flags));
-    TEST_ASSERT_EQUAL(1, flags.sequence);
+    TEST_ASSERT_EQUAL(1, flags.newest.sequence);
 }
 
 static void test_there_and_back_before_it_is_written_writes_nothing(void)

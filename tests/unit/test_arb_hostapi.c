@@ -528,7 +528,7 @@ static void test_a_host_that_does_not_read_costs_no_time(void)
         ask(0x2201, NULL, 0); /* the last one is the fifth */
     }
     TEST_ASSERT_TRUE(app.api.turn.waiting);
-    TEST_ASSERT_EQUAL(1, app.api.busy);
+    TEST_ASSERT_EQUAL(1, app.api.counters[ARB_HOSTAPI_BUSY]);
     exchange_wait(&x, 2100);
     (void)exchange_drain(&x);
     TEST_ASSERT_GREATER_THAN_INT32(0, (int32_t)(arb_app_step(&app, x.now_ms) - x.now_ms));

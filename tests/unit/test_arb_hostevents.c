@@ -192,8 +192,8 @@ static void test_what_waits_when_the_mask_changes(void)
     hostlink_answer(0x2417, 2, NULL, 0);
     expect_event(BYTES(6, TIME, 1, 0, 0));
     hostlink_silence();
-    TEST_ASSERT_EQUAL(1, app.api.events.sent);
-    TEST_ASSERT_EQUAL(0, app.api.events.dropped[4]);
+    TEST_ASSERT_EQUAL(1, app.api.events.counters[0]);
+    TEST_ASSERT_EQUAL(0, app.api.events.counters[ARB_EVENT_FRAME]);
 }
 
 /* An event of which the first bytes have left is sent to its end, then the answer, then the other events. */
@@ -254,13 +254,14 @@ static void test_events_are_dropped_and_counted(void)
     for (int i = 0; i < 100; i++) {
         exchange_rx(&x, "02A#0102030405060708");
     }
-    TEST_ASSERT_EQUAL(0, app.api.events.dropped[5]);
-    TEST_ASSERT_GREATER_THAN(90, app.api.events.dropped[4]);
+    TEST_ASSERT_EQUAL(0, app.api.events.counters[ARB_EVENT_BUS_STATE]);
+    TEST_ASSERT_GREATER_THAN(90, app.api.events.counters[ARB_EVENT_FRAME]);
     for (int i = 0; i < 40; i++) {
         arb_app_on_state(&app, x.now_ms, i % 2 == 0 ? PDCP_BUS_PASSIVE : PDCP_BUS_ACTIVE);
     }
-    TEST_ASSERT_GREATER_THAN(10, app.api.events.dropped[5]);
-    const uint32_t dropped = app.api.events.dropped[4] + app.api.events.dropped[5];
+    TEST_ASSERT_GREATER_THAN(10, app.api.events.counters[ARB_EVENT_BUS_STATE]);
+    const uint32_t dropped =
+        app.api.events.counters[ARB_EVENT_FRAME] + app.api.events.counters[ARB_EVENT_BUS_STATE];
     hostlink_room(4000);
     exchange_step(&x);
     uint32_t came = 0;
@@ -270,7 +271,7 @@ static void test_events_are_dropped_and_counted(void)
         came++;
     }
     TEST_ASSERT_EQUAL(140, came + dropped);
-    TEST_ASSERT_EQUAL(came, app.api.events.sent);
+    TEST_ASSERT_EQUAL(came, app.api.events.counters[0]);
     hostlink_silence();
 }
 
@@ -308,9 +309,9 @@ static void test_what_was_begun_ends_with_its_host(void)
 {
     hostlink_send(&x, "FE 19 04 23 00 00 40 00 02 00"); /* 54 bytes are missing */
     hostlink_ask(&x, 0x2416, 8, BYTES(0x10));
-    const uint32_t garbage = app.api.rx.garbage;
+    const uint32_t garbage = app.api.rx.counters[ARB_HOSTRX_GARBAGE];
     arb_app_on_host_gone(&app);
-    TEST_ASSERT_EQUAL(garbage + 21, app.api.rx.garbage);
+    TEST_ASSERT_EQUAL(garbage + 21, app.api.rx.counters[ARB_HOSTRX_GARBAGE]);
     exchange_pass(&x, 200);
     hostlink_silence();
     TEST_ASSERT_EQUAL(0, app.api.events.mask);
@@ -392,8 +393,8 @@ static void test_answers_at_full_bus_load(void)
     }
     TEST_ASSERT_GREATER_THAN(LOAD_MS / 50, asked);
     TEST_ASSERT_GREATER_THAN(20, worst); /* the line was full */
-    TEST_ASSERT_GREATER_THAN(LOAD_MS * 7, app.api.events.dropped[4]);
-    TEST_ASSERT_GREATER_THAN(LOAD_MS / 4, app.api.events.sent);
+    TEST_ASSERT_GREATER_THAN(LOAD_MS * 7, app.api.events.counters[ARB_EVENT_FRAME]);
+    TEST_ASSERT_GREATER_THAN(LOAD_MS / 4, app.api.events.counters[0]);
 }
 
 int main(void)

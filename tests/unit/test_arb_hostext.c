@@ -55,7 +55,7 @@ static void test_bytes(void)
 #endif
     hostlink_send(&x, "FE 19 16 24 02 06 03 00 00 F0 E1");
     hostlink_expect("FE 19 17 24 02 5B 00 00");
-    hostlink_send(&x, "FE 19 13 24 03 80 03 00 03 93 D1");
+    hostlink_send(&x, "FE 19 13 24 03 80 03 00 04 74 A1");
     hostlink_expect("FE 19 15 24 03 CB 03 00 02 B2 C1");
     hostlink_silence();
 }
@@ -329,7 +329,7 @@ static void test_the_active_configuration_is_written_away(void)
     wait_for_answer();
     expect(0x240E, NULL, 0);
     TEST_ASSERT_EQUAL(0, app.limb.active);
-    TEST_ASSERT_FALSE(app.limb.run.stored);
+    TEST_ASSERT_FALSE(app.arb.bus.link.stored);
     TEST_ASSERT_FALSE(app.arb.bus.link.stored);
 }
 
@@ -529,7 +529,24 @@ static void test_statistics_of_the_storage(void)
     TEST_ASSERT_EQUAL(3, counter(2, 0, 4 + ARB_CONFIG_COUNTERS));
     TEST_ASSERT_EQUAL(1, counter(2, 3, 4 + ARB_CONFIG_COUNTERS));
     TEST_ASSERT_EQUAL(2, counter(2, 4 + ARB_CONFIG_DAMAGED, 4 + ARB_CONFIG_COUNTERS));
+}
+
+static uint32_t driver_counter(void *ctx, arb_port_counter_t which)
+{
+    (void)ctx;
+    static const uint32_t values[] = {0x01020304, 5, 6};
+    return values[which];
+}
+
+static void test_statistics_of_the_drivers(void) /* D-API-18 */
+{
+    TEST_ASSERT_EQUAL_HEX32(0, counter(3, 0, 3));
+    arb_port_t counting = *app.port;
+    counting.counter = driver_counter;
+    app.port = &counting;
     ask(0x2413, BYTES(3));
+    expect(0x2414, BYTES(3, 4, 3, 2, 1, 5, 0, 0, 0, 6, 0, 0, 0));
+    ask(0x2413, BYTES(4));
     expect_error(0x2415, 0x02);
 }
 
@@ -561,5 +578,6 @@ int main(void)
     RUN_TEST(test_statistics_of_the_bus);
     RUN_TEST(test_statistics_of_the_host_link);
     RUN_TEST(test_statistics_of_the_storage);
+    RUN_TEST(test_statistics_of_the_drivers);
     return UNITY_END();
 }

@@ -11,7 +11,7 @@ static arb_app_t app;
 /* Of each area only the beginning is kept: no test writes more, and a small machine holds two of these. */
 enum { KEPT = 256 };
 
-static uint8_t memory[ARB_STORE_AREAS * KEPT];
+static uint8_t memory[ARB_AREAS * KEPT];
 static int writes_left; /* before the power fails; -1: it does not */
 static size_t bytes_left_of_last;
 
@@ -34,7 +34,7 @@ static uint8_t *byte_of(uint16_t address)
 {
     const uint16_t area = (uint16_t)(address / ARB_STORE_AREA);
     const uint16_t at = (uint16_t)(address % ARB_STORE_AREA);
-    return area < ARB_STORE_AREAS && at < KEPT ? &memory[area * KEPT + at] : NULL;
+    return area < ARB_AREAS && at < KEPT ? &memory[area * KEPT + at] : NULL;
 }
 
 static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
@@ -126,7 +126,7 @@ static void test_power_may_fail_at_any_byte(void)
     memcpy(before, memory, sizeof memory);
     int old = 0;
     int fresh = 0;
-    for (size_t cut = 0; cut <= ARB_STORE_HEADER + 2 * ARB_STORE_ENTRY + ARB_STORE_CRC; cut++) {
+    for (size_t cut = 0; cut <= ARB_AREA_HEADER + 2 * ARB_STORE_ENTRY + ARB_AREA_CRC; cut++) {
         memcpy(memory, before, sizeof memory);
         writes_left = -1;
         start();
@@ -154,7 +154,7 @@ static void test_a_damaged_copy_is_seen_and_not_used(void)
     exchange_pass(&x, 600);
     uint8_t good[sizeof memory];
     memcpy(good, memory, sizeof memory);
-    for (unsigned area = 0; area < ARB_STORE_AREAS; area++) {
+    for (unsigned area = 0; area < ARB_AREAS; area++) {
         for (unsigned byte = 2; byte < 17; byte++) {
             memcpy(memory, good, sizeof memory);
             memory[area * KEPT + byte] ^= 0x10;

@@ -304,7 +304,7 @@ static void test_one_rotten_bit_anywhere_and_the_other_area_is_used(void)
     get_string(&strings[0]);
     (void)save(2, 1, 0x5300);
     get_string(&strings[1]);
-    TEST_ASSERT_EQUAL(1, config.area);
+    TEST_ASSERT_EQUAL(1, config.newest.area);
     for (unsigned area = 0; area < 2; area++) {
         const uint32_t address = 2048u + 8192u * area;
         for (unsigned bit = 0; bit < 12 * 8; bit++) {
@@ -357,7 +357,7 @@ static void test_a_bad_string_under_a_good_crc_is_not_used(void)
         }
         power_on();
         TEST_ASSERT_EQUAL(count, config.counters[ARB_CONFIG_DAMAGED]);
-        TEST_ASSERT_EQUAL(count == 0 ? 9 : 0, config.sequence);
+        TEST_ASSERT_EQUAL(count == 0 ? 9 : 0, config.newest.sequence);
     }
 }
 
@@ -453,11 +453,11 @@ static void test_writes_of_a_save(void)
 /* The areas take turns, also when the number of writes wraps. */
 static void test_wear_is_even(void)
 {
-    config.sequence = 0xFF00;
+    config.newest.sequence = 0xFF00;
     for (uint16_t i = 0; i < 1000; i++) {
         TEST_ASSERT_EQUAL(ARB_CONFIG_OK, save(1, 3, (uint16_t)(0x5300 + i)));
         power_on();
-        TEST_ASSERT_EQUAL_HEX16((0xFF00u + 1 + i) & 0xFFFFu, config.sequence);
+        TEST_ASSERT_EQUAL_HEX16((0xFF00u + 1 + i) & 0xFFFFu, config.newest.sequence);
     }
     for (unsigned page = 0; page < 4; page++) {
         TEST_ASSERT_EQUAL(500, memory.page_writes[2048 / 64 + page]);
@@ -478,8 +478,7 @@ static arb_flags_t flags;
 static void load_store(void)
 {
     memset(&bind, 0, sizeof bind);
-    arb_store_load(&store, &port, &bind);
-    arb_store_share(&store, &nvm);
+    arb_store_load(&store, &nvm, &bind);
 }
 
 static void remember(uint16_t sn, uint8_t node_id)
@@ -493,7 +492,7 @@ static void write_store(void)
     arb_store_touch(&store, now_ms);
     for (int i = 0; i < 200; i++) {
         now_ms = arb_store_next_ms(&store, now_ms);
-        arb_store_step(&store, &port, &bind, now_ms);
+        arb_store_step(&store, &bind, now_ms);
         if (!store.changed) {
             break;
         }
@@ -613,7 +612,7 @@ static void test_three_users_of_one_memory(void)
         for (int i = 0; i < 3000; i++) {
             memory.fail_after = memory.failed ? SIM_NVM_NEVER : memory.fail_after;
             arb_config_step(&config, &nvm, now_ms);
-            arb_store_step(&store, &port, &bind, now_ms);
+            arb_store_step(&store, &bind, now_ms);
             arb_flags_step(&flags, &nvm, now_ms);
             now_ms++;
         }

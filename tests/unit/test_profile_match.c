@@ -108,15 +108,21 @@ static void test_the_order_of_equally_alike_channels(void)
     check_before("4.4", "1.1");
 }
 
+static void check_precedes(const pdcp_identity_t *a, const pdcp_identity_t *b)
+{
+    TEST_ASSERT_TRUE(profile_precedes(0x2110, a, 1, 0x2110, b, 1));
+    TEST_ASSERT_FALSE(profile_precedes(0x2110, b, 1, 0x2110, a, 1));
+    TEST_ASSERT_TRUE(profile_precedes(0x2110, b, 1, 0x2120, a, 1));
+}
+
 static void test_the_order_of_identities(void)
 {
     const pdcp_identity_t a = {.vid = 1, .pid = 900, .sn = 900};
     const pdcp_identity_t b = {.vid = 2, .pid = 1, .sn = 900};
     const pdcp_identity_t c = {.vid = 2, .pid = 1, .sn = 0xFFFF};
-    TEST_ASSERT_TRUE(profile_order(&a, &b) < 0);
-    TEST_ASSERT_TRUE(profile_order(&b, &a) > 0);
-    TEST_ASSERT_TRUE(profile_order(&b, &c) < 0);
-    TEST_ASSERT_EQUAL_INT8(0, profile_order(&b, &b));
+    check_precedes(&a, &b);
+    check_precedes(&b, &c);
+    TEST_ASSERT_FALSE(profile_precedes(0x2110, &b, 1, 0x2110, &b, 1));
 }
 
 static void test_only_channels_of_devices_that_are_set_up_are_ready(void)

@@ -36,8 +36,7 @@ void setUp(void)
     }
     app.arb.bus.nodes = s.nodes;
     app.limb.run.state = PROFILE_RUNNING;
-    app.limb.run.autoconfigure = true;
-    app.limb.run.hot_swap = true;
+    app.limb.run.at_events = PROFILE_PLAN_ALL;
 }
 
 void tearDown(void) {}
@@ -68,7 +67,7 @@ static int finish_plan(void)
 
 static void begin_plan(void)
 {
-    profile_run_begin(&app.limb.run, &app.arb, PROFILE_FOR_LOAD, PROFILE_PLAN_ALL);
+    profile_run_begin(&app.limb.run, &app.arb, PROFILE_PLAN_ALL, true);
 }
 
 static void tell(pdcp_event_kind_t kind, uint8_t node)

@@ -93,7 +93,16 @@ STORAGE = Group(
     ),
 )
 
-GROUPS = (BUS, HOST, STORAGE)
+DRIVERS = Group(
+    "drivers",
+    (
+        ("frames_lost", "received frames lost before the arbitrator took them"),
+        ("frames_unsent", "frames that are known not to have left"),
+        ("bytes_lost", "bytes from the host lost before the arbitrator took them"),
+    ),
+)
+
+GROUPS = (BUS, HOST, STORAGE, DRIVERS)
 
 
 def name_counters(group: int, values: Sequence[int]) -> Stats:

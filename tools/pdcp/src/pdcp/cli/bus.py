@@ -19,7 +19,18 @@ from ..capture import open_bus, open_frames, play, read_bus, to_message
 from ..decode import Decoder, format_line, to_json
 from ..frames import Frame
 from ..profiles import Profile, parse_profile, profile_name, profiles
-from .common import CommandError, JsonOption, Status, UsageFault, new_console, new_table, show, waiting, wants_json
+from .common import (
+    CommandError,
+    JsonOption,
+    Status,
+    UsageFault,
+    new_console,
+    new_table,
+    reason,
+    show,
+    waiting,
+    wants_json,
+)
 
 SEND_PATIENCE_S = 1.0  # a full transmit queue empties meanwhile
 
@@ -57,16 +68,16 @@ class Complaints:
 @contextmanager
 def _bus(interface: str, channel: str, options: list[str] | None) -> Iterator[can.BusABC]:
     pairs = dict(option.partition("=")[::2] for option in options or [])
+    where = " ".join((interface, channel)).strip()
     try:
         bus = open_bus(interface, channel, pairs)
     except (can.CanError, OSError, ValueError, TypeError, NotImplementedError, ImportError) as error:
-        where = " ".join((interface, channel)).strip()
-        raise CommandError(f"{where}: {error}", Status.NO_CONNECTION) from error
+        raise CommandError(f"{where}: {reason(error)}", Status.NO_CONNECTION) from error
     with bus:
         try:
             yield bus
         except can.CanError as error:
-            raise CommandError(f"{interface} {channel}: {error}", Status.NO_CONNECTION) from error
+            raise CommandError(f"{where}: {reason(error)}", Status.NO_CONNECTION) from error
 
 
 class Source:

@@ -20,7 +20,7 @@ from typer.core import TyperGroup, TyperOption
 from typer.exceptions import Abort, Exit, TyperException
 
 from ..client import Client
-from ..errors import BadAnswerError, ConnectionFailedError, NoAnswerError, PdcpError
+from ..errors import BadAnswerError, ConnectionFailedError, NoAnswerError, PdcpError, RequestError
 from ..messages import FormatError
 
 PIPE_WIDTH = 500  # columns: a row stays one line where no terminal limits it
@@ -65,6 +65,14 @@ class Settings:
     json: bool
 
 
+# What the argument parser says of a value, and how this program says it.
+_WORDING = (
+    ("Value error, ", ""),
+    ("Input should be", "must be"),
+    (", unable to parse string as an integer", ""),
+    (", unable to parse string as a number", ""),
+)
+
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
@@ -80,6 +88,15 @@ def connect(ctx: typer.Context) -> Client:
     if options.port is None:
         raise UsageFault("no port: give --port PATH or set PDCP_PORT; 'pdcp ports' shows what there is")
     return Client(options.port, options.baud, timeout_s=options.timeout_s)
+
+
+@contextmanager
+def about(what: object) -> Iterator[None]:
+    """Puts in front of a refusal what was asked for."""
+    try:
+        yield
+    except RequestError as error:
+        raise CommandError(f"{what}: {error}") from error
 
 
 def wants_json(ctx: typer.Context, as_json: bool) -> bool:
@@ -154,6 +171,18 @@ def waiting(what: str, total: int | None = None) -> Iterator[Callable[..., None]
         progress.stop()
 
 
+def reason(error: Exception) -> str:
+    """What went wrong in words; of an error of the system without its number."""
+    return (isinstance(error, OSError) and error.strerror) or str(error)
+
+
+def _wording(error: TyperException) -> str:
+    text = error.format_message()
+    for theirs, ours in _WORDING:
+        text = text.replace(theirs, ours)
+    return text.rstrip(".")
+
+
 def _complain(text: str, status: Status) -> int:
     line = " ".join(text.split())
     sys.stderr.write(f"pdcp: {line}\n")
@@ -199,7 +228,9 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
     except FormatError as error:  # a value that no message can carry
         return _complain(str(error), Status.USAGE)
     except TyperException as error:
-        return _complain(f"{error.format_message()} ('pdcp --help' tells more)", Status.USAGE)
+        # Without text: a group was called without a command, and its help has been shown.
+        text = _wording(error)
+        return _complain(f"{text} ('pdcp --help' tells more)", Status.USAGE) if text else Status.USAGE
     except BrokenPipeError:
         # The reader has gone; the interpreter flushes standard output once more at its end.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from ..tlv import TlvError, from_yaml, parse, to_yaml
-from .common import UsageFault, connect, waiting
+from .common import JsonOption, UsageFault, about, connect, show, waiting
 
 HELP = "Stored configurations as YAML: out of an arbitrator, into it, or between files."
 
@@ -52,12 +52,17 @@ def export(ctx: typer.Context, out: OutArgument = "-") -> None:
 
 
 def import_(
-    ctx: typer.Context, file: Annotated[str, typer.Argument(metavar="FILE", help="YAML; - is standard input.")]
+    ctx: typer.Context,
+    file: Annotated[str, typer.Argument(metavar="FILE", help="YAML; - is standard input.")],
+    as_json: JsonOption = False,
 ) -> None:
     """Store the configurations of a YAML file in the arbitrator, in place of those that it has."""
     data = _encoded(file)
-    with connect(ctx) as client, waiting("writing configurations") as step:
+    with connect(ctx) as client, waiting("writing configurations") as step, about(file):
         client.write_configurations(data, step)
+    count = len(parse(data))
+    text = f"{count} {'configuration' if count == 1 else 'configurations'} stored, {len(data)} bytes"
+    show(ctx, as_json, {"stored_configurations": count, "bytes": len(data)}, text)
 
 
 def decode(

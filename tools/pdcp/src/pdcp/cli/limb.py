@@ -1,5 +1,6 @@
 """Commands that ask and tell devices: get, set, suspend, release, reset, passthrough."""
 
+from collections.abc import Callable
 from typing import Annotated
 
 import typer
@@ -9,7 +10,7 @@ from ..client import Client
 from ..model import BROADCAST, ChannelId, Identity, parse_number
 from ..parameters import PARAMETERS, TRANSFER_KINDS, TRANSFER_TYPE, Kind, Parameter, find
 from . import targets
-from .common import Json, JsonOption, UsageFault, connect, show, waiting
+from .common import Json, JsonOption, UsageFault, about, connect, show, waiting
 from .tables import parameter_grid, parameter_json, parameters_json, read_parameters
 
 CAN_DATA_MAX = 8
@@ -39,7 +40,8 @@ def _kind(client: Client, target: ChannelId) -> Kind:
     """What a target is; a channel is asked itself."""
     if target.index == 0:
         return Kind.DEVICE
-    value = client.get_parameter(target, TRANSFER_TYPE)
+    with about(target):
+        value = client.get_parameter(target, TRANSFER_TYPE)
     return TRANSFER_KINDS.get(int.from_bytes(value[:1]), Kind.INPUT)
 
 
@@ -52,6 +54,10 @@ def _find(kind: Kind, text: str) -> Parameter | int:
 
 def _number(parameter: Parameter | int) -> int:
     return parameter if isinstance(parameter, int) else parameter.number
+
+
+def _name(parameter: Parameter | int) -> str:
+    return f"parameter {parameter}" if isinstance(parameter, int) else parameter.name
 
 
 def _value_json(parameter: Parameter | int, value: bytes) -> Json:
@@ -75,12 +81,12 @@ def get(
         kind = _kind(client, found)
         head: Json = {"id": str(found), "kind": str(kind)}
         if parameter is None:
-            with waiting("reading parameters", len(PARAMETERS[kind])) as step:
+            with waiting("reading parameters", len(PARAMETERS[kind])) as step, about(found):
                 read = read_parameters(client, found, kind, step)
             show(ctx, as_json, head | {"parameters": parameters_json(read)}, parameter_grid(read, 0))
             return
         chosen = _find(kind, parameter)
-        with waiting("reading"):
+        with waiting("reading"), about(f"{found}, {_name(chosen)}"):
             value = client.get_parameter(found, _number(chosen))
     data = head | _value_json(chosen, value)
     show(ctx, as_json, data, Text(value.hex(" ") if raw else str(data["text"])))
@@ -116,7 +122,8 @@ def parse_value(parameter: Parameter | int, words: list[str]) -> bytes:
         try:
             value = parameter.parse(words)
         except ValueError as error:
-            raise UsageFault(f"{parameter.name}: {error}") from None
+            told = str(error)
+            raise UsageFault(told if parameter.name in told else f"{parameter.name}: {told}") from None
     if not value:
         raise UsageFault("a value must have one byte at least")
     return value
@@ -134,6 +141,7 @@ def set_(
             "hex:01F4, text:..., u8:N, u16:N, u32:N.",
         ),
     ],
+    as_json: JsonOption = False,
 ) -> None:
     """Write a parameter of a device or channel."""
     with connect(ctx) as client:
@@ -142,16 +150,31 @@ def set_(
         by_number = parameter.isdecimal() and len(value) == 1 and _bytes(value[0]) is not None
         chosen = _find(Kind.DEVICE if by_number else _kind(client, found), parameter)
         data = parse_value(chosen, value)
-        with waiting("writing"):
+        with waiting("writing"), about(f"{found}, {_name(chosen)}"):
             client.set_parameter(found, _number(chosen), data)
+    shown = data.hex(" ") if isinstance(chosen, int) else chosen.show(data)
+    text = Text(f"{found}: {_name(chosen)} set to {shown}")
+    show(ctx, as_json, {"id": str(found), "parameter": _number(chosen), "raw": data.hex()}, text)
 
 
 # --- commands to devices ---
 
 
-def _each(client: Client, names: list[str] | None) -> list[Identity | None]:
-    """The devices named; None for all."""
-    return [targets.device(client, name) for name in names] if names else [None]
+def _each(
+    ctx: typer.Context,
+    as_json: bool,
+    names: list[str] | None,
+    done: str,
+    act: Callable[[Client, Identity | None], None],
+) -> None:
+    """Does something to each of the devices named, or at once to all, and says so."""
+    with connect(ctx) as client, waiting("working"):
+        chosen: list[Identity | None] = [targets.device(client, name) for name in names] if names else [None]
+        for identity in chosen:
+            with about(identity or "all devices"):
+                act(client, identity)
+    text = ", ".join(str(identity or "all devices") for identity in chosen)
+    show(ctx, as_json, {"devices": [str(each) for each in chosen if each] or "all"}, Text(f"{text}: {done}"))
 
 
 def suspend(
@@ -161,25 +184,21 @@ def suspend(
         int,
         typer.Option("--ms", min=0, max=SUSPEND_MAX_MS, metavar="MS", help="For so long; 0: until they are released."),
     ] = 0,
+    as_json: JsonOption = False,
 ) -> None:
     """Make devices stop sending channel data."""
-    with connect(ctx) as client:
-        for identity in _each(client, device):
-            client.suspend(identity, ms)
+    done = f"suspended for {ms} ms" if ms else "suspended until released"
+    _each(ctx, as_json, device, done, lambda client, identity: client.suspend(identity, ms))
 
 
-def release(ctx: typer.Context, device: DevicesArgument = None) -> None:
+def release(ctx: typer.Context, device: DevicesArgument = None, as_json: JsonOption = False) -> None:
     """Let suspended devices send again."""
-    with connect(ctx) as client:
-        for identity in _each(client, device):
-            client.release(identity)
+    _each(ctx, as_json, device, "released", lambda client, identity: client.release(identity))
 
 
-def reset(ctx: typer.Context, device: DevicesArgument = None) -> None:
+def reset(ctx: typer.Context, device: DevicesArgument = None, as_json: JsonOption = False) -> None:
     """Reset devices. They bind again and get their links back."""
-    with connect(ctx) as client, waiting("resetting"):
-        for identity in _each(client, device):
-            client.reset(identity)
+    _each(ctx, as_json, device, "reset", lambda client, identity: client.reset(identity))
 
 
 def passthrough(
@@ -197,6 +216,7 @@ def passthrough(
         raise UsageFault(f"a frame has 1 to {CAN_DATA_MAX} bytes, not {len(frame)}")
     with connect(ctx) as client:
         identity = BROADCAST if device == "all" else targets.device(client, device)
-        answer = client.passthrough(identity, frame)
+        with about("broadcast" if identity == BROADCAST else identity):
+            answer = client.passthrough(identity, frame)
     text = answer.hex(" ").upper()
     show(ctx, as_json, {"id": str(identity), "sent": frame.hex(), "answer": answer.hex()}, Text(text))

@@ -1,6 +1,7 @@
 """Commands that change links, configurations and what the profile layer does by itself."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from enum import StrEnum
 from typing import Annotated
 
@@ -8,9 +9,10 @@ import typer
 from rich.text import Text
 
 from ..client import Client
+from ..errors import ErrorCode, RequestError
 from ..model import Action, Flags
 from . import targets
-from .common import Json, JsonOption, connect, show, waiting
+from .common import CommandError, Json, JsonOption, about, connect, show, waiting
 from .tables import STATUS_STYLES
 
 NumberArgument = Annotated[
@@ -61,7 +63,8 @@ def link(
     """Link an output to an input, whose source it replaces."""
     with connect(ctx) as client, waiting("linking"):
         source, target = targets.output(client, output), targets.input_(client, input_)
-        status = client.link(source, target)
+        with about(f"{source} → {target}"):
+            status = client.link(source, target)
     name = status.name.lower()
     text = Text.assemble(f"{source} → {target}: ", (name, STATUS_STYLES[status]))
     show(ctx, as_json, {"output": str(source), "input": str(target), "status": name}, text)
@@ -70,10 +73,14 @@ def link(
 def unlink(
     ctx: typer.Context,
     input_: Annotated[str, typer.Argument(metavar="INPUT", help=targets.INPUT_HELP)],
+    as_json: JsonOption = False,
 ) -> None:
     """Remove the link of an input."""
     with connect(ctx) as client, waiting("unlinking"):
-        client.unlink(targets.input_(client, input_))
+        target = targets.input_(client, input_)
+        with about(target):
+            client.unlink(target)
+    show(ctx, as_json, {"input": str(target)}, f"{target}: has no link now")
 
 
 def _act(ctx: typer.Context, as_json: bool, what: Action, done: str, argument: int = 0) -> None:
@@ -132,10 +139,26 @@ def _switch(ctx: typer.Context, as_json: bool, name: FlagName, on: bool) -> None
     show(ctx, as_json, {"flag": str(name), "on": on}, f"{name} {'on' if on else 'off'}")
 
 
-def _with_active(ctx: typer.Context, as_json: bool, act: Callable[[Client], str]) -> None:
-    """An action on configurations; tells which is active afterwards and how many are stored."""
+def _name(number: int) -> str:
+    return f"configuration {number}" if number else "active configuration"
+
+
+@contextmanager
+def _stored(number: int) -> Iterator[None]:
+    """A number that is out of range inside is one under which nothing is stored."""
+    try:
+        yield
+    except RequestError as error:
+        if error.code == ErrorCode.OUT_OF_RANGE:
+            raise CommandError(f"there is no {_name(number)}; 'pdcp config export' shows what is stored") from None
+        raise
+
+
+def _with_active(ctx: typer.Context, as_json: bool, number: int, act: Callable[[Client], str]) -> None:
+    """An action on a configuration; tells which is active afterwards and how many are stored."""
     with connect(ctx) as client, waiting("working"):
-        done = act(client)
+        with about(_name(number)):
+            done = act(client)
         info = client.info()
     active = f"configuration {info.active} is active" if info.active else "none is active"
     data: Json = {"active_configuration": info.active, "stored_configurations": info.stored}
@@ -153,24 +176,26 @@ def save(
         client.action(Action.SAVE, number)
         return "saved"
 
-    _with_active(ctx, as_json, act)
+    _with_active(ctx, as_json, number, act)
 
 
 def load(ctx: typer.Context, number: NumberArgument = 0, as_json: JsonOption = False) -> None:
     """Make the links of a stored configuration, and remove all others."""
 
     def act(client: Client) -> str:
-        count = client.action(Action.LOAD, number)
+        with _stored(number):
+            count = client.action(Action.LOAD, number)
         return f"loaded, {count} {'link' if count == 1 else 'links'} changed"
 
-    _with_active(ctx, as_json, act)
+    _with_active(ctx, as_json, number, act)
 
 
 def erase(ctx: typer.Context, number: NumberArgument = 0, as_json: JsonOption = False) -> None:
     """Forget a stored configuration. Its links stay as they are."""
 
     def act(client: Client) -> str:
-        client.action(Action.ERASE, number)
+        with _stored(number):
+            client.action(Action.ERASE, number)
         return "erased"
 
-    _with_active(ctx, as_json, act)
+    _with_active(ctx, as_json, number, act)

@@ -300,7 +300,8 @@ def links(ctx: typer.Context, names: NamesOption = True, as_json: JsonOption = F
 def stats(
     ctx: typer.Context,
     group: Annotated[
-        str | None, typer.Argument(metavar="GROUP", help="A group: bus, host, storage, or its number. Without: all.")
+        str | None,
+        typer.Argument(metavar="GROUP", help="A group: bus, host, storage, drivers, or its number. Without: all."),
     ] = None,
     as_json: JsonOption = False,
 ) -> None:
@@ -331,12 +332,14 @@ Read = tuple[Parameter, bytes | None, str]  # value, or why there is none
 
 
 def read_parameters(client: Client, target: ChannelId, kind: Kind, step: Callable[[], None]) -> list[Read]:
-    """All parameters that this kind of thing may have."""
+    """All parameters that this kind of thing may have. A target that nobody knows is refused with the first."""
     found: list[Read] = []
     for parameter in PARAMETERS[kind]:
         try:
             found.append((parameter, client.get_parameter(target, parameter.number), ""))
         except RequestError as error:
+            if error.code in (ErrorCode.UNKNOWN_DEVICE, ErrorCode.UNKNOWN_CHANNEL):
+                raise
             refused = error.code == ErrorCode.DEVICE_REFUSED
             found.append((parameter, None, "not supported" if refused else error.meaning))
         step()
@@ -385,7 +388,7 @@ def print_all(ctx: typer.Context, as_json: JsonOption = False) -> None:
     with connect(ctx) as client:
         system = client.system_info()
         found = arbitrator_info(client)
-        device_rows, channel_rows = client.devices(), [*client.inputs(), *client.outputs()]
+        device_rows, channel_rows = (client.devices(), [*client.inputs(), *client.outputs()])
         link_rows = client.links()
         names = Names(client)
         reads = [(row.id, Kind.DEVICE) for row in device_rows]

@@ -42,7 +42,7 @@ static inline void part_enable_interrupts(void) {}
 /* The last page holds the serial number, two areas for storage stand right in front of it. */
 #define PART_SERIAL_AT 0xA800uL
 #ifndef PART_FLASH_STORE_PAGES
-#define PART_FLASH_STORE_PAGES 3u /* of one area; firmware: storage_pages in CMakeLists.txt */
+#define PART_FLASH_STORE_PAGES 5u /* of one area; firmware: PDCP_STORAGE_PAGES of CMakeLists.txt */
 #endif
 #define PART_FLASH_STORE_AT (PART_SERIAL_AT - 2u * PART_FLASH_STORE_PAGES * PART_FLASH_PAGE)
 

@@ -99,14 +99,15 @@ bool profile_run_take_up(profile_run_t *run, const pdcp_arb_t *arb)
     return complete;
 }
 
-/* The input of a device (PDCP_NONE: of any) that comes next behind the last one; PDCP_NONE: there are no
- * more. */
+/* The input of a device (PDCP_NONE: of any) that names a source and comes next behind the last one;
+ * PDCP_NONE: there are no more. */
 static uint8_t next_input_of(const pdcp_nodes_t *nodes, uint8_t node, uint8_t last)
 {
     uint8_t best = PDCP_NONE;
+    profile_end_t source;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         if ((node == PDCP_NONE || nodes->channels[i].node == node) &&
-            profile_is_ready(nodes, i, PDCP_INPUT) &&
+            profile_is_ready(nodes, i, PDCP_INPUT) && profile_source_of(nodes, i, &source) &&
             (last == PDCP_NONE || profile_is_before(nodes, last, i)) &&
             (best == PDCP_NONE || profile_is_before(nodes, i, best))) {
             best = i;

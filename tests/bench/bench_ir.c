@@ -192,6 +192,15 @@ static void do_idle_step(job_t *job, uint32_t count)
     check(job->sent->count == sent, "something was due");
 }
 
+/* The longest piece of work that cannot be interrupted: the whole limb is looked through and taken up. */
+static void do_profile_start(job_t *job, uint32_t count)
+{
+    for (uint32_t i = 0; i < count; i++) {
+        profile_run_start(&job->app->limb.run, &job->app->arb, false);
+    }
+    check(job->app->limb.run.state == PROFILE_CONFIGURING, "no plan was begun");
+}
+
 typedef struct {
     const char *name;
     void (*run)(job_t *job, uint32_t count);
@@ -200,7 +209,7 @@ typedef struct {
 static const thing_t things[] = {
     {"beacon", do_beacon},       {"beacon_in_time", do_beacon_in_time}, {"answer", do_answer},
     {"bulk", do_bulk},           {"channel_data", do_channel_data},     {"foreign", do_foreign},
-    {"idle_step", do_idle_step},
+    {"idle_step", do_idle_step}, {"profile_start", do_profile_start},
 };
 
 static const thing_t *find(const char *name)

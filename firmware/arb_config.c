@@ -121,9 +121,13 @@ static void count(arb_config_t *config, arb_config_counter_t counter)
     config->counters[counter]++;
 }
 
-void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
+void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user_t *user, void *ctx,
+                     uint32_t now_ms)
 {
     memset(config, 0, sizeof *config);
+    config->user = user;
+    config->ctx = ctx;
+    config->due_ms = now_ms;
     config->newest.area = ARB_AREAS;
     config->length = sizeof empty_string;
     config->crc = arb_crc32(ARB_CRC32_INIT, empty_string, sizeof empty_string);
@@ -138,15 +142,13 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
 
 /* Jobs -------------------------------------------------------------------------------------------------- */
 
-static void start(arb_config_t *config, phase_t phase, arb_config_done_t done, void *ctx, uint32_t now_ms)
+/* With no job under way due_ms is the time of the last step. */
+static void start(arb_config_t *config, phase_t phase, const uint8_t *piece)
 {
     config->phase = (uint8_t)phase;
     config->polls = 0;
-    config->piece = NULL;
+    config->piece = piece;
     config->count_at = CONFIG_NOWHERE;
-    config->done = done;
-    config->ctx = ctx;
-    config->due_ms = now_ms;
 }
 
 static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t status)
@@ -158,23 +160,23 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
     } else if (status == ARB_CONFIG_ERR_STORAGE) {
         count(config, ARB_CONFIG_FAILURES);
     }
-    config->done(config->ctx, status);
+    if (config->piece != NULL) {
+        config->raw_status = (int8_t)status;
+    }
 }
 
-arb_config_status_t arb_config_read(arb_config_t *config, const profile_tlv_sink_t *sink,
-                                    arb_config_done_t done, void *ctx, uint32_t now_ms)
+arb_config_status_t arb_config_read(arb_config_t *config)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
     }
-    start(config, PHASE_READ, done, ctx, now_ms);
-    open_string(config, config->newest.area, config->length, sink);
+    start(config, PHASE_READ, NULL);
+    open_string(config, config->newest.area, config->length, &config->user->sink);
     return ARB_CONFIG_OK;
 }
 
 /* Replaces the configuration number by block bytes. */
-static void start_change(arb_config_t *config, uint8_t number, uint16_t block, arb_config_done_t done,
-                         void *ctx, uint32_t now_ms)
+static void start_change(arb_config_t *config, uint8_t number, uint16_t block)
 {
     config->number = number;
     config->stored_new = config->stored;
@@ -185,13 +187,11 @@ static void start_change(arb_config_t *config, uint8_t number, uint16_t block, a
     config->raw_at = 0;
     config->length_new = 0;
     config->cut_to = 0;
-    start(config, PHASE_SCAN, done, ctx, now_ms);
+    start(config, PHASE_SCAN, NULL);
     open_string(config, config->newest.area, config->length, NULL);
 }
 
-arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count,
-                                    arb_config_link_t link, arb_config_done_t done, void *ctx,
-                                    uint32_t now_ms)
+arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
@@ -205,15 +205,12 @@ arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8
         } while (arb_config_has(config, *number));
     }
     config->count = count;
-    config->link = link;
     start_change(config, *number,
-                 (uint16_t)(PROFILE_TLV_CONFIGURATION_BYTES + (uint16_t)PROFILE_TLV_LINK_BYTES * count), done,
-                 ctx, now_ms);
+                 (uint16_t)(PROFILE_TLV_CONFIGURATION_BYTES + (uint16_t)PROFILE_TLV_LINK_BYTES * count));
     return ARB_CONFIG_OK;
 }
 
-arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number, arb_config_done_t done, void *ctx,
-                                     uint32_t now_ms)
+arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
@@ -221,13 +218,12 @@ arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number, arb_c
     if (!arb_config_has(config, number)) {
         return ARB_CONFIG_ERR_NUMBER;
     }
-    start_change(config, number, 0, done, ctx, now_ms);
+    start_change(config, number, 0);
     return ARB_CONFIG_OK;
 }
 
 arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, uint16_t total,
-                                         const uint8_t *bytes, uint16_t len, arb_config_done_t done,
-                                         void *ctx, uint32_t now_ms)
+                                         const uint8_t *bytes, uint16_t len)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
@@ -245,8 +241,8 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
         config->length_new = total;
         config->same = total == config->length;
     }
-    start(config, config->same ? PHASE_COMPARE : PHASE_WRITE, done, ctx, now_ms);
-    config->piece = bytes;
+    start(config, config->same ? PHASE_COMPARE : PHASE_WRITE, bytes);
+    config->raw_status = ARB_CONFIG_ERR_BUSY;
     config->raw_at = 0; /* until the piece is in */
     config->cut_from = offset;
     config->at = offset;
@@ -283,7 +279,7 @@ static void put_entry(const arb_config_t *config, uint16_t k, uint8_t entry[PROF
     } else {
         const uint8_t link_k = (uint8_t)((k - 3) / PROFILE_TLV_LINK_ENTRIES);
         profile_link_t link;
-        config->link(config->ctx, link_k, &link);
+        config->user->link(config->ctx, link_k, &link);
         profile_tlv_put_link_entry(entry, (uint8_t)(link_k + 1), &link,
                                    (uint8_t)((k - 3) % PROFILE_TLV_LINK_ENTRIES));
     }
@@ -503,30 +499,38 @@ static arb_config_status_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm
     return ARB_CONFIG_OK;
 }
 
-void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
+arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
 {
     static const phase_step_t steps[] = {
         [PHASE_READ] = step_read,   [PHASE_SCAN] = step_read,  [PHASE_COMPARE] = step_new,
         [PHASE_WRITE] = step_new,   [PHASE_CHECK] = step_read, [PHASE_HEADER] = step_header,
         [PHASE_ADOPT] = step_adopt,
     };
-    if (!arb_config_busy(config) || pdcp_time_before(now_ms, config->due_ms)) {
-        return;
+    if (!arb_config_busy(config)) {
+        config->due_ms = now_ms;
+        return ARB_CONFIG_ERR_BUSY;
+    }
+    if (pdcp_time_before(now_ms, config->due_ms)) {
+        return ARB_CONFIG_ERR_BUSY;
     }
     const int8_t state = arb_nvm_poll(nvm, ARB_NVM_CONFIG, &config->due_ms, now_ms);
     if (state > 0 && config->polls < ARB_CONFIG_POLLS_MAX) {
         config->polls++;
-        return;
+        return ARB_CONFIG_ERR_BUSY;
     }
     const bool failed = state > 0 || (state < 0 && config->writing);
     config->polls = 0;
     config->writing = false;
     const arb_config_status_t status = failed ? ARB_CONFIG_ERR_STORAGE : steps[config->phase](config, nvm);
     if (status != ARB_CONFIG_OK || config->phase == PHASE_IDLE) {
+        config->due_ms = now_ms;
         finish(config, nvm, status);
-    } else if (!config->writing) {
+        return status;
+    }
+    if (!config->writing) {
         config->due_ms = now_ms + ARB_CONFIG_PACE_MS;
     }
+    return ARB_CONFIG_ERR_BUSY;
 }
 
 uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms)

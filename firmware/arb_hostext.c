@@ -56,7 +56,7 @@ uint8_t arb_hostext_action(arb_call_t *call)
     if (arb_limb_is_starting(limb, call->arb)) {
         return arb_call_wait_ready(call);
     }
-    error = arb_limb_act(limb, call->arb, call->now_ms, call->payload[0], call->payload[1]);
+    error = arb_limb_act(limb, call->arb, call->payload[0], call->payload[1]);
     if (error == ARB_ERR_BUSY) {
         return arb_call_wait_ready(call);
     }
@@ -106,34 +106,27 @@ uint8_t arb_hostext_read_configs(arb_call_t *call)
     return ARB_OK;
 }
 
-static void on_piece_written(void *ctx, arb_config_status_t status)
-{
-    arb_turn_t *turn = ctx;
-    turn->ended = true;
-    turn->status = (int8_t)status;
-}
-
 /* 240Dh: offset, total length, bytes. Each piece is a job of the storage, the last one that of the whole
  * string. */
 uint8_t arb_hostext_write_configs(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
-    arb_turn_t *turn = &call->api->turn;
+    arb_config_t *config = &limb->config;
     const uint16_t offset = arb_host_get_u16(&call->payload[0]);
     const uint16_t total = arb_host_get_u16(&call->payload[2]);
     const uint16_t len = (uint16_t)(call->len - 4);
-    if (!turn->started) {
-        const arb_config_status_t status = arb_config_write_raw(
-            &limb->config, offset, total, &call->payload[4], len, on_piece_written, turn, call->now_ms);
+    if (!call->api->turn.started) {
+        const arb_config_status_t status =
+            arb_config_write_raw(config, offset, total, &call->payload[4], len);
         return status == ARB_CONFIG_OK ? arb_call_started(call) : error_of_config(call, (int8_t)status);
     }
-    if (!turn->ended) {
+    if (config->raw_status == ARB_CONFIG_ERR_BUSY) {
         return ARB_PENDING;
     }
-    if (turn->status >= 0 && (uint16_t)(total - offset) == len) {
+    if (config->raw_status >= 0 && (uint16_t)(total - offset) == len) {
         arb_limb_on_written(limb, call->arb);
     }
-    return error_of_config(call, turn->status);
+    return error_of_config(call, config->raw_status);
 }
 
 /* 2410h: input channel. The outcome is seen in the tables: a job before it may tell of the same link. */

@@ -21,9 +21,8 @@ typedef enum {
     PHASE_IDLE = 0, /* see arb_config_busy */
     PHASE_READ,     /* the stored string goes to the sink */
     PHASE_SCAN,     /* save, erase: where in the stored string what stands */
-    PHASE_COMPARE,  /* is the new string what is stored? */
-    PHASE_WRITE,    /* the new string, page by page */
-    PHASE_CHECK,    /* the new string is read back */
+    PHASE_NEW,   /* the new string is compared with the stored one as long as it is the same, else written */
+    PHASE_CHECK, /* the new string is read back */
     PHASE_HEADER,
     PHASE_ADOPT /* the header is read back */
 } phase_t;
@@ -241,7 +240,7 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
         config->length_new = total;
         config->same = total == config->length;
     }
-    start(config, config->same ? PHASE_COMPARE : PHASE_WRITE, bytes);
+    start(config, PHASE_NEW, bytes);
     config->raw_status = ARB_CONFIG_ERR_BUSY;
     config->raw_at = 0; /* until the piece is in */
     config->cut_from = offset;
@@ -299,10 +298,11 @@ static uint16_t put_run(const arb_config_t *config, const arb_nvm_t *nvm, uint16
         return len;
     } else if (offset < config->block) {
         uint8_t entry[PROFILE_TLV_ENTRY_BYTES];
+        if (config->count_at != CONFIG_NOWHERE) { /* the stored string has entry 0 */
+            offset = (uint16_t)(offset + PROFILE_TLV_ENTRY_BYTES);
+        }
         const uint16_t skip = offset % PROFILE_TLV_ENTRY_BYTES;
-        put_entry(config,
-                  (uint16_t)(offset / PROFILE_TLV_ENTRY_BYTES + (config->count_at == CONFIG_NOWHERE ? 0 : 1)),
-                  entry);
+        put_entry(config, offset / PROFILE_TLV_ENTRY_BYTES, entry);
         run = at_most(len, (uint16_t)(PROFILE_TLV_ENTRY_BYTES - skip));
         memcpy(bytes, &entry[skip], run);
         return run;
@@ -348,7 +348,6 @@ static arb_config_status_t end_part(arb_config_t *config)
 
 static void begin_write(arb_config_t *config)
 {
-    config->phase = PHASE_WRITE;
     config->same = false;
     config->at = 0;
     if (config->piece == NULL) {
@@ -372,8 +371,7 @@ static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t fresh[ARB_PORT_NVM_PAGE];
     const uint16_t at = config->at;
-    const bool compares = config->phase == PHASE_COMPARE;
-    const uint16_t room = compares ? CONFIG_CHUNK : (uint16_t)(sizeof fresh - at % sizeof fresh);
+    const uint16_t room = config->same ? CONFIG_CHUNK : (uint16_t)(sizeof fresh - at % sizeof fresh);
     const uint16_t len = at_most(room, (uint16_t)(config->until - at));
     if (len == 0) {
         return end_part(config);
@@ -382,7 +380,7 @@ static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
         return ARB_CONFIG_ERR_STORAGE;
     }
     config->at = (uint16_t)(at + len);
-    if (compares) {
+    if (config->same) {
         uint8_t stored[CONFIG_CHUNK];
         if (!read_string(nvm, config->newest.area, at, stored, len)) {
             return ARB_CONFIG_ERR_STORAGE;
@@ -442,8 +440,8 @@ static arb_config_status_t end_scan(arb_config_t *config)
         return ARB_CONFIG_ERR_STORAGE;
     }
     begin_write(config);
+    config->phase = PHASE_NEW;
     if (config->length_new == config->length) { /* then a block of another length has another last entry */
-        config->phase = PHASE_COMPARE;
         config->same = true;
         config->at = config->cut_from;
         config->until = (uint16_t)(config->cut_from + config->block);
@@ -502,9 +500,8 @@ static arb_config_status_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm
 arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
 {
     static const phase_step_t steps[] = {
-        [PHASE_READ] = step_read,   [PHASE_SCAN] = step_read,  [PHASE_COMPARE] = step_new,
-        [PHASE_WRITE] = step_new,   [PHASE_CHECK] = step_read, [PHASE_HEADER] = step_header,
-        [PHASE_ADOPT] = step_adopt,
+        [PHASE_READ] = step_read,  [PHASE_SCAN] = step_read,     [PHASE_NEW] = step_new,
+        [PHASE_CHECK] = step_read, [PHASE_HEADER] = step_header, [PHASE_ADOPT] = step_adopt,
     };
     if (!arb_config_busy(config)) {
         config->due_ms = now_ms;

@@ -31,7 +31,7 @@ typedef enum {
 static const uint8_t empty_string[PROFILE_TLV_FRAME_BYTES] = {
     PROFILE_TLV_CONFIGURATIONS, 0, 0, PROFILE_TLV_END, 0, 0};
 
-static uint16_t at_most(uint16_t a, uint16_t b)
+static inline uint16_t at_most(uint16_t a, uint16_t b)
 {
     return a < b ? a : b;
 }
@@ -528,9 +528,4 @@ arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32
         config->due_ms = now_ms + ARB_CONFIG_PACE_MS;
     }
     return ARB_CONFIG_ERR_BUSY;
-}
-
-uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms)
-{
-    return arb_config_busy(config) ? config->due_ms : now_ms + PDCP_TIME_FAR_MS;
 }

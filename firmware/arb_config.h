@@ -24,6 +24,7 @@
 #include "arb_area.h"
 #include "arb_flags.h"
 #include "arb_store.h"
+#include "pdcp_time.h"
 #include "profile_tlv.h"
 
 /* Pages that a string may take in a small memory: its share of what the others leave, without the header's.
@@ -116,13 +117,16 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user
  * ARB_CONFIG_ERR_BUSY. */
 arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
 
-/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to do. */
-uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms);
-
 /* A job is under way. */
 static inline bool arb_config_busy(const arb_config_t *config)
 {
     return config->phase != 0;
+}
+
+/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to do. */
+static inline uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms)
+{
+    return arb_config_busy(config) ? config->due_ms : now_ms + PDCP_TIME_FAR_MS;
 }
 
 /* Whether this configuration is stored. */

@@ -151,11 +151,16 @@ uint8_t arb_hostext_remove_link(arb_call_t *call)
     return arb_call_started(call);
 }
 
+static void put_counter(arb_call_t *call, uint32_t value)
+{
+    arb_host_put_u32(&call->answer[call->answer_len], value);
+    call->answer_len = (uint16_t)(call->answer_len + 4);
+}
+
 static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count)
 {
-    for (uint8_t i = 0; i < count; i++) {
-        arb_host_put_u32(&call->answer[call->answer_len], values[i]);
-        call->answer_len = (uint16_t)(call->answer_len + 4);
+    for (; count > 0; count--) {
+        put_counter(call, *values++);
     }
 }
 
@@ -163,8 +168,7 @@ static void put_driver_counters(arb_call_t *call)
 {
     const arb_port_t *port = call->env->port;
     for (uint8_t i = 0; i < (uint8_t)ARB_PORT_COUNTERS; i++) {
-        const uint32_t value = port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0;
-        put_counters(call, &value, 1);
+        put_counter(call, port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0);
     }
 }
 
@@ -172,8 +176,10 @@ static void put_storage_counters(arb_call_t *call)
 {
     const arb_store_t *store = call->env->store;
     const arb_limb_t *limb = call->env->limb;
-    const uint32_t values[] = {store->failures, store->damaged, limb->flags.failures, limb->flags.damaged};
-    put_counters(call, values, 4);
+    put_counter(call, store->failures);
+    put_counter(call, store->damaged);
+    put_counter(call, limb->flags.failures);
+    put_counter(call, limb->flags.damaged);
     put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
 }
 

@@ -21,9 +21,8 @@ typedef enum {
     PHASE_IDLE = 0, /* see arb_config_busy */
     PHASE_READ,     /* the stored string goes to the sink */
     PHASE_SCAN,     /* save, erase: where in the stored string what stands */
-    PHASE_COMPARE,  /* is the new string what is stored? */
-    PHASE_WRITE,    /* the new string, page by page */
-    PHASE_CHECK,    /* the new string is read back */
+    PHASE_NEW,   /* the new string is compared with the stored one as long as it is the same, else written */
+    PHASE_CHECK, /* the new string is read back */
     PHASE_HEADER,
     PHASE_ADOPT /* the header is read back */
 } phase_t;
@@ -32,7 +31,7 @@ typedef enum {
 static const uint8_t empty_string[PROFILE_TLV_FRAME_BYTES] = {
     PROFILE_TLV_CONFIGURATIONS, 0, 0, PROFILE_TLV_END, 0, 0};
 
-static uint16_t at_most(uint16_t a, uint16_t b)
+static inline uint16_t at_most(uint16_t a, uint16_t b)
 {
     return a < b ? a : b;
 }
@@ -121,9 +120,13 @@ static void count(arb_config_t *config, arb_config_counter_t counter)
     config->counters[counter]++;
 }
 
-void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
+void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user_t *user, void *ctx,
+                     uint32_t now_ms)
 {
     memset(config, 0, sizeof *config);
+    config->user = user;
+    config->ctx = ctx;
+    config->due_ms = now_ms;
     config->newest.area = ARB_AREAS;
     config->length = sizeof empty_string;
     config->crc = arb_crc32(ARB_CRC32_INIT, empty_string, sizeof empty_string);
@@ -138,15 +141,13 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm)
 
 /* Jobs -------------------------------------------------------------------------------------------------- */
 
-static void start(arb_config_t *config, phase_t phase, arb_config_done_t done, void *ctx, uint32_t now_ms)
+/* With no job under way due_ms is the time of the last step. */
+static void start(arb_config_t *config, phase_t phase, const uint8_t *piece)
 {
     config->phase = (uint8_t)phase;
     config->polls = 0;
-    config->piece = NULL;
+    config->piece = piece;
     config->count_at = CONFIG_NOWHERE;
-    config->done = done;
-    config->ctx = ctx;
-    config->due_ms = now_ms;
 }
 
 static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t status)
@@ -158,23 +159,23 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
     } else if (status == ARB_CONFIG_ERR_STORAGE) {
         count(config, ARB_CONFIG_FAILURES);
     }
-    config->done(config->ctx, status);
+    if (config->piece != NULL) {
+        config->raw_status = (int8_t)status;
+    }
 }
 
-arb_config_status_t arb_config_read(arb_config_t *config, const profile_tlv_sink_t *sink,
-                                    arb_config_done_t done, void *ctx, uint32_t now_ms)
+arb_config_status_t arb_config_read(arb_config_t *config)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
     }
-    start(config, PHASE_READ, done, ctx, now_ms);
-    open_string(config, config->newest.area, config->length, sink);
+    start(config, PHASE_READ, NULL);
+    open_string(config, config->newest.area, config->length, &config->user->sink);
     return ARB_CONFIG_OK;
 }
 
 /* Replaces the configuration number by block bytes. */
-static void start_change(arb_config_t *config, uint8_t number, uint16_t block, arb_config_done_t done,
-                         void *ctx, uint32_t now_ms)
+static void start_change(arb_config_t *config, uint8_t number, uint16_t block)
 {
     config->number = number;
     config->stored_new = config->stored;
@@ -185,13 +186,11 @@ static void start_change(arb_config_t *config, uint8_t number, uint16_t block, a
     config->raw_at = 0;
     config->length_new = 0;
     config->cut_to = 0;
-    start(config, PHASE_SCAN, done, ctx, now_ms);
+    start(config, PHASE_SCAN, NULL);
     open_string(config, config->newest.area, config->length, NULL);
 }
 
-arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count,
-                                    arb_config_link_t link, arb_config_done_t done, void *ctx,
-                                    uint32_t now_ms)
+arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
@@ -205,15 +204,12 @@ arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8
         } while (arb_config_has(config, *number));
     }
     config->count = count;
-    config->link = link;
     start_change(config, *number,
-                 (uint16_t)(PROFILE_TLV_CONFIGURATION_BYTES + (uint16_t)PROFILE_TLV_LINK_BYTES * count), done,
-                 ctx, now_ms);
+                 (uint16_t)(PROFILE_TLV_CONFIGURATION_BYTES + (uint16_t)PROFILE_TLV_LINK_BYTES * count));
     return ARB_CONFIG_OK;
 }
 
-arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number, arb_config_done_t done, void *ctx,
-                                     uint32_t now_ms)
+arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
@@ -221,13 +217,12 @@ arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number, arb_c
     if (!arb_config_has(config, number)) {
         return ARB_CONFIG_ERR_NUMBER;
     }
-    start_change(config, number, 0, done, ctx, now_ms);
+    start_change(config, number, 0);
     return ARB_CONFIG_OK;
 }
 
 arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, uint16_t total,
-                                         const uint8_t *bytes, uint16_t len, arb_config_done_t done,
-                                         void *ctx, uint32_t now_ms)
+                                         const uint8_t *bytes, uint16_t len)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
@@ -245,8 +240,8 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
         config->length_new = total;
         config->same = total == config->length;
     }
-    start(config, config->same ? PHASE_COMPARE : PHASE_WRITE, done, ctx, now_ms);
-    config->piece = bytes;
+    start(config, PHASE_NEW, bytes);
+    config->raw_status = ARB_CONFIG_ERR_BUSY;
     config->raw_at = 0; /* until the piece is in */
     config->cut_from = offset;
     config->at = offset;
@@ -283,7 +278,7 @@ static void put_entry(const arb_config_t *config, uint16_t k, uint8_t entry[PROF
     } else {
         const uint8_t link_k = (uint8_t)((k - 3) / PROFILE_TLV_LINK_ENTRIES);
         profile_link_t link;
-        config->link(config->ctx, link_k, &link);
+        config->user->link(config->ctx, link_k, &link);
         profile_tlv_put_link_entry(entry, (uint8_t)(link_k + 1), &link,
                                    (uint8_t)((k - 3) % PROFILE_TLV_LINK_ENTRIES));
     }
@@ -303,10 +298,11 @@ static uint16_t put_run(const arb_config_t *config, const arb_nvm_t *nvm, uint16
         return len;
     } else if (offset < config->block) {
         uint8_t entry[PROFILE_TLV_ENTRY_BYTES];
+        if (config->count_at != CONFIG_NOWHERE) { /* the stored string has entry 0 */
+            offset = (uint16_t)(offset + PROFILE_TLV_ENTRY_BYTES);
+        }
         const uint16_t skip = offset % PROFILE_TLV_ENTRY_BYTES;
-        put_entry(config,
-                  (uint16_t)(offset / PROFILE_TLV_ENTRY_BYTES + (config->count_at == CONFIG_NOWHERE ? 0 : 1)),
-                  entry);
+        put_entry(config, offset / PROFILE_TLV_ENTRY_BYTES, entry);
         run = at_most(len, (uint16_t)(PROFILE_TLV_ENTRY_BYTES - skip));
         memcpy(bytes, &entry[skip], run);
         return run;
@@ -352,7 +348,6 @@ static arb_config_status_t end_part(arb_config_t *config)
 
 static void begin_write(arb_config_t *config)
 {
-    config->phase = PHASE_WRITE;
     config->same = false;
     config->at = 0;
     if (config->piece == NULL) {
@@ -376,8 +371,7 @@ static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t fresh[ARB_PORT_NVM_PAGE];
     const uint16_t at = config->at;
-    const bool compares = config->phase == PHASE_COMPARE;
-    const uint16_t room = compares ? CONFIG_CHUNK : (uint16_t)(sizeof fresh - at % sizeof fresh);
+    const uint16_t room = config->same ? CONFIG_CHUNK : (uint16_t)(sizeof fresh - at % sizeof fresh);
     const uint16_t len = at_most(room, (uint16_t)(config->until - at));
     if (len == 0) {
         return end_part(config);
@@ -386,7 +380,7 @@ static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
         return ARB_CONFIG_ERR_STORAGE;
     }
     config->at = (uint16_t)(at + len);
-    if (compares) {
+    if (config->same) {
         uint8_t stored[CONFIG_CHUNK];
         if (!read_string(nvm, config->newest.area, at, stored, len)) {
             return ARB_CONFIG_ERR_STORAGE;
@@ -446,8 +440,8 @@ static arb_config_status_t end_scan(arb_config_t *config)
         return ARB_CONFIG_ERR_STORAGE;
     }
     begin_write(config);
+    config->phase = PHASE_NEW;
     if (config->length_new == config->length) { /* then a block of another length has another last entry */
-        config->phase = PHASE_COMPARE;
         config->same = true;
         config->at = config->cut_from;
         config->until = (uint16_t)(config->cut_from + config->block);
@@ -503,33 +497,35 @@ static arb_config_status_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm
     return ARB_CONFIG_OK;
 }
 
-void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
+arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
 {
     static const phase_step_t steps[] = {
-        [PHASE_READ] = step_read,   [PHASE_SCAN] = step_read,  [PHASE_COMPARE] = step_new,
-        [PHASE_WRITE] = step_new,   [PHASE_CHECK] = step_read, [PHASE_HEADER] = step_header,
-        [PHASE_ADOPT] = step_adopt,
+        [PHASE_READ] = step_read,  [PHASE_SCAN] = step_read,     [PHASE_NEW] = step_new,
+        [PHASE_CHECK] = step_read, [PHASE_HEADER] = step_header, [PHASE_ADOPT] = step_adopt,
     };
-    if (!arb_config_busy(config) || pdcp_time_before(now_ms, config->due_ms)) {
-        return;
+    if (!arb_config_busy(config)) {
+        config->due_ms = now_ms;
+        return ARB_CONFIG_ERR_BUSY;
+    }
+    if (pdcp_time_before(now_ms, config->due_ms)) {
+        return ARB_CONFIG_ERR_BUSY;
     }
     const int8_t state = arb_nvm_poll(nvm, ARB_NVM_CONFIG, &config->due_ms, now_ms);
     if (state > 0 && config->polls < ARB_CONFIG_POLLS_MAX) {
         config->polls++;
-        return;
+        return ARB_CONFIG_ERR_BUSY;
     }
     const bool failed = state > 0 || (state < 0 && config->writing);
     config->polls = 0;
     config->writing = false;
     const arb_config_status_t status = failed ? ARB_CONFIG_ERR_STORAGE : steps[config->phase](config, nvm);
     if (status != ARB_CONFIG_OK || config->phase == PHASE_IDLE) {
+        config->due_ms = now_ms;
         finish(config, nvm, status);
-    } else if (!config->writing) {
+        return status;
+    }
+    if (!config->writing) {
         config->due_ms = now_ms + ARB_CONFIG_PACE_MS;
     }
-}
-
-uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms)
-{
-    return arb_config_busy(config) ? config->due_ms : now_ms + PDCP_TIME_FAR_MS;
+    return ARB_CONFIG_ERR_BUSY;
 }

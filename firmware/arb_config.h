@@ -11,9 +11,10 @@
  * by bytes 0 to 7. A memory that holds nothing good reads as a string without configurations (1 0, 15 0), so
  * that whatever is read can be written back.
  *
- * One job at a time: it is started by a function below, carried on by arb_config_step in small steps (one
- * page written or ARB_CONFIG_READ_MAX bytes read), and ends with a call of done. What is already stored is
- * not written. What is written is read back and checked before its header makes it the newest copy. */
+ * One job at a time: it is started by a function below and carried on by arb_config_step in small steps (one
+ * page written or ARB_CONFIG_READ_MAX bytes read), the last of which tells how it ended. What is already
+ * stored is not written. What is written is read back and checked before its header makes it the newest
+ * copy. */
 #ifndef ARB_CONFIG_H
 #define ARB_CONFIG_H
 
@@ -23,6 +24,7 @@
 #include "arb_area.h"
 #include "arb_flags.h"
 #include "arb_store.h"
+#include "pdcp_time.h"
 #include "profile_tlv.h"
 
 /* Pages that a string may take in a small memory: its share of what the others leave, without the header's.
@@ -44,21 +46,21 @@ enum {
 
 /* How a start or a job ended; 0 or more is good. */
 typedef enum {
-    ARB_CONFIG_OK = 0,           /* a start: it is under way, done will be called; a job: done */
+    ARB_CONFIG_OK = 0,           /* a start: it is under way; a job: done */
     ARB_CONFIG_UNCHANGED = 1,    /* a job: done, nothing had to be written */
-    ARB_CONFIG_ERR_BUSY = -1,    /* a start: a job is under way; try again later */
+    ARB_CONFIG_ERR_BUSY = -1,    /* a start: a job is under way; try again later. A step: none has ended */
     ARB_CONFIG_ERR_STORAGE = -2, /* too long for an area, or the memory has failed: nothing has changed */
     ARB_CONFIG_ERR_VALUE = -3,   /* a piece out of order, or a string that profile_tlv.h rejects */
     ARB_CONFIG_ERR_NUMBER = -4   /* no such configuration */
 } arb_config_status_t;
 
-/* A job is over. Called once for every start that returned ARB_CONFIG_OK, from arb_config_step; may start the
- * next job. */
-typedef void (*arb_config_done_t)(void *ctx, arb_config_status_t status);
-
-/* Gives link k, from 0, of the configuration to be saved. Called several times for each link, in any order;
- * what it gives must stay the same until the job is over. */
-typedef void (*arb_config_link_t)(void *ctx, uint8_t k, profile_link_t *link);
+/* Whose links are stored. */
+typedef struct {
+    /* Gives link k, from 0, of the configuration to be saved. Called several times for each link, in any
+     * order; what it gives must stay the same until the job is over. */
+    void (*link)(void *ctx, uint8_t k, profile_link_t *link);
+    profile_tlv_sink_t sink; /* takes the links that are read */
+} arb_config_user_t;
 
 /* Counters since the start, in the order of the host's statistics group 2. */
 typedef enum {
@@ -97,28 +99,34 @@ typedef struct {
     uint32_t crc_new;  /* registers: of the new string, */
     uint32_t crc_read; /* of what was read */
     uint32_t due_ms;
-    arb_config_link_t link;
-    arb_config_done_t done;
+    const arb_config_user_t *user;
     void *ctx;
     const uint8_t *piece; /* the host's; NULL: another job */
+    int8_t raw_status;    /* how the host's last piece ended; ARB_CONFIG_ERR_BUSY: it is under way */
     uint16_t raw_at;      /* bytes that are in of the host's write, which outlasts the job of a piece */
     profile_tlv_t reader;
 } arb_config_t;
 
 /* Checks both areas and chooses the newest good one. Blocks for as long as the memory needs to be read
- * (24LC256: 0.4 s when both areas are full). */
-void arb_config_init(arb_config_t *config, arb_nvm_t *nvm);
+ * (24LC256: 0.4 s when both areas are full). user, whose functions get ctx, must outlive config. */
+void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user_t *user, void *ctx,
+                     uint32_t now_ms);
 
-/* Does what is due: at most one page written, or ARB_CONFIG_READ_MAX bytes read. */
-void arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
-
-/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to do. */
-uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms);
+/* Does what is due: at most one page written, or ARB_CONFIG_READ_MAX bytes read. Returns, once for every
+ * start that returned ARB_CONFIG_OK, how the job ended, after which the next one may be started; else
+ * ARB_CONFIG_ERR_BUSY. */
+arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
 
 /* A job is under way. */
 static inline bool arb_config_busy(const arb_config_t *config)
 {
     return config->phase != 0;
+}
+
+/* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to do. */
+static inline uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t now_ms)
+{
+    return arb_config_busy(config) ? config->due_ms : now_ms + PDCP_TIME_FAR_MS;
 }
 
 /* Whether this configuration is stored. */
@@ -127,22 +135,20 @@ static inline bool arb_config_has(const arb_config_t *config, uint8_t number)
     return profile_tlv_has(config->numbers, number);
 }
 
-/* Hands all stored configurations to sink, in the order in which they stand. After any end but ARB_CONFIG_OK
- * (ERR_STORAGE: the memory has failed or the copy is damaged) what was handed over must not be used. sink,
- * which gets ctx too, must last until done. */
-arb_config_status_t arb_config_read(arb_config_t *config, const profile_tlv_sink_t *sink,
-                                    arb_config_done_t done, void *ctx, uint32_t now_ms);
+/* A job begins with the first step after its start. */
+
+/* Hands all stored configurations to the user's sink, in the order in which they stand. After any end but
+ * ARB_CONFIG_OK (ERR_STORAGE: the memory has failed or the copy is damaged) what was handed over must not be
+ * used. */
+arb_config_status_t arb_config_read(arb_config_t *config);
 
 /* Stores count links as configuration *number; 0 takes the lowest free number and puts it there. A
  * configuration of that number is replaced where it stands, with all that is in it; all others stay entry by
  * entry as they are. Abandons a host's write that is not complete. */
-arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count,
-                                    arb_config_link_t link, arb_config_done_t done, void *ctx,
-                                    uint32_t now_ms);
+arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8_t count);
 
 /* Removes a configuration. Abandons a host's write that is not complete. */
-arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number, arb_config_done_t done, void *ctx,
-                                     uint32_t now_ms);
+arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number);
 
 /* Length of the stored string. */
 static inline uint16_t arb_config_length(const arb_config_t *config)
@@ -159,10 +165,9 @@ arb_config_status_t arb_config_read_raw(const arb_config_t *config, const arb_nv
 /* Takes the next piece of a string of total bytes that replaces the stored one. Offset 0 begins, anew if need
  * be; any other must follow the piece before, with the same total: else ERR_VALUE, and what is in stays in.
  * The last piece stores the whole string, if profile_tlv.h accepts it; else nothing has changed. Each piece
- * is a job; bytes must last until done. Pieces that end at a multiple of ARB_PORT_NVM_PAGE wear the memory
- * least. */
+ * is a job; bytes must last until its end, which config->raw_status tells too. Pieces that end at a multiple
+ * of ARB_PORT_NVM_PAGE wear the memory least. */
 arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, uint16_t total,
-                                         const uint8_t *bytes, uint16_t len, arb_config_done_t done,
-                                         void *ctx, uint32_t now_ms);
+                                         const uint8_t *bytes, uint16_t len);
 
 #endif

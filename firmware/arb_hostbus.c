@@ -135,9 +135,12 @@ static bool breaks_sole_access(const arb_call_t *call, const pdcp_channel_t *inp
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const pdcp_identity_t *source = &nodes->nodes[call->place[0]].identity;
+    const pdcp_channel_t *other = nodes->channels;
     bool claimed = false;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *other = &nodes->channels[i];
+    if (!profile_is_sole(input)) {
+        return false;
+    }
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, other++) {
         if (other->link == PDCP_LINK_NONE || other->source_index != call->payload[6] ||
             !pdcp_identity_equal(&other->source, source) || !profile_is_sole(other)) {
             continue;
@@ -147,7 +150,7 @@ static bool breaks_sole_access(const arb_call_t *call, const pdcp_channel_t *inp
         }
         claimed = true;
     }
-    return claimed && profile_is_sole(input);
+    return claimed;
 }
 
 /* Why there is no link to be made: an output whose device could not be set up because all node ids are given

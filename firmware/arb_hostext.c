@@ -56,7 +56,7 @@ uint8_t arb_hostext_action(arb_call_t *call)
     if (arb_limb_is_starting(limb, call->arb)) {
         return arb_call_wait_ready(call);
     }
-    error = arb_limb_act(limb, call->arb, call->now_ms, call->payload[0], call->payload[1]);
+    error = arb_limb_act(limb, call->arb, call->payload[0], call->payload[1]);
     if (error == ARB_ERR_BUSY) {
         return arb_call_wait_ready(call);
     }
@@ -106,34 +106,27 @@ uint8_t arb_hostext_read_configs(arb_call_t *call)
     return ARB_OK;
 }
 
-static void on_piece_written(void *ctx, arb_config_status_t status)
-{
-    arb_turn_t *turn = ctx;
-    turn->ended = true;
-    turn->status = (int8_t)status;
-}
-
 /* 240Dh: offset, total length, bytes. Each piece is a job of the storage, the last one that of the whole
  * string. */
 uint8_t arb_hostext_write_configs(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
-    arb_turn_t *turn = &call->api->turn;
+    arb_config_t *config = &limb->config;
     const uint16_t offset = arb_host_get_u16(&call->payload[0]);
     const uint16_t total = arb_host_get_u16(&call->payload[2]);
     const uint16_t len = (uint16_t)(call->len - 4);
-    if (!turn->started) {
-        const arb_config_status_t status = arb_config_write_raw(
-            &limb->config, offset, total, &call->payload[4], len, on_piece_written, turn, call->now_ms);
+    if (!call->api->turn.started) {
+        const arb_config_status_t status =
+            arb_config_write_raw(config, offset, total, &call->payload[4], len);
         return status == ARB_CONFIG_OK ? arb_call_started(call) : error_of_config(call, (int8_t)status);
     }
-    if (!turn->ended) {
+    if (config->raw_status == ARB_CONFIG_ERR_BUSY) {
         return ARB_PENDING;
     }
-    if (turn->status >= 0 && (uint16_t)(total - offset) == len) {
+    if (config->raw_status >= 0 && (uint16_t)(total - offset) == len) {
         arb_limb_on_written(limb, call->arb);
     }
-    return error_of_config(call, turn->status);
+    return error_of_config(call, config->raw_status);
 }
 
 /* 2410h: input channel. The outcome is seen in the tables: a job before it may tell of the same link. */
@@ -158,11 +151,16 @@ uint8_t arb_hostext_remove_link(arb_call_t *call)
     return arb_call_started(call);
 }
 
+static void put_counter(arb_call_t *call, uint32_t value)
+{
+    arb_host_put_u32(&call->answer[call->answer_len], value);
+    call->answer_len = (uint16_t)(call->answer_len + 4);
+}
+
 static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count)
 {
-    for (uint8_t i = 0; i < count; i++) {
-        arb_host_put_u32(&call->answer[call->answer_len], values[i]);
-        call->answer_len = (uint16_t)(call->answer_len + 4);
+    for (; count > 0; count--) {
+        put_counter(call, *values++);
     }
 }
 
@@ -170,8 +168,7 @@ static void put_driver_counters(arb_call_t *call)
 {
     const arb_port_t *port = call->env->port;
     for (uint8_t i = 0; i < (uint8_t)ARB_PORT_COUNTERS; i++) {
-        const uint32_t value = port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0;
-        put_counters(call, &value, 1);
+        put_counter(call, port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0);
     }
 }
 
@@ -179,8 +176,10 @@ static void put_storage_counters(arb_call_t *call)
 {
     const arb_store_t *store = call->env->store;
     const arb_limb_t *limb = call->env->limb;
-    const uint32_t values[] = {store->failures, store->damaged, limb->flags.failures, limb->flags.damaged};
-    put_counters(call, values, 4);
+    put_counter(call, store->failures);
+    put_counter(call, store->damaged);
+    put_counter(call, limb->flags.failures);
+    put_counter(call, limb->flags.damaged);
     put_counters(call, limb->config.counters, ARB_CONFIG_COUNTERS);
 }
 

@@ -9,6 +9,11 @@ void arb_hostrx_init(arb_hostrx_t *rx)
     memset(rx, 0, sizeof *rx);
 }
 
+static void count(arb_hostrx_t *rx, arb_hostrx_counter_t counter)
+{
+    rx->counters[counter]++;
+}
+
 /* Bytes like FE 19, or FE as the last one, are where a message may begin. Returns the next such place from at
  * on; rx->len: there is none. */
 static uint16_t next_sync(const arb_hostrx_t *rx, uint16_t at)
@@ -22,10 +27,10 @@ static uint16_t next_sync(const arb_hostrx_t *rx, uint16_t at)
     return at;
 }
 
-/* Drops what was taken, and goes on to the next place where a message may begin. */
-static void hunt(arb_hostrx_t *rx)
+/* Drops what was taken, and goes on to the next place, at from or behind it, where a message may begin. */
+static void hunt(arb_hostrx_t *rx, uint16_t from)
 {
-    const uint16_t at = next_sync(rx, rx->taken);
+    const uint16_t at = next_sync(rx, from);
     if (at != 0) {
         rx->counters[ARB_HOSTRX_GARBAGE] += (uint16_t)(at - rx->taken);
         rx->len = (uint16_t)(rx->len - at);
@@ -43,9 +48,7 @@ void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte)
 
 void arb_hostrx_clear(arb_hostrx_t *rx)
 {
-    hunt(rx);
-    rx->counters[ARB_HOSTRX_GARBAGE] += rx->len;
-    rx->len = 0;
+    hunt(rx, rx->len);
 }
 
 static bool crc8_matches(const uint8_t *header)
@@ -102,7 +105,7 @@ static front_t check(arb_hostrx_t *rx, arb_hostrx_request_t *request)
     }
     const front_t front = look_inside(rx, front_total(rx));
     if (front != FRONT_OPEN) {
-        rx->counters[crc8_ok ? ARB_HOSTRX_BAD_CRC16S : ARB_HOSTRX_BAD_CRC8S]++;
+        count(rx, crc8_ok ? ARB_HOSTRX_BAD_CRC16S : ARB_HOSTRX_BAD_CRC8S);
     }
     request->error = ARB_ERR_CRC;
     return front;
@@ -121,7 +124,7 @@ static front_t look_at_front(arb_hostrx_t *rx, arb_hostrx_request_t *request)
     request->len = 0;
     request->error = ARB_OK;
     if (size != 0 && (size <= ARB_HOST_CRC || size > ARB_HOST_REQUEST_MAX + ARB_HOST_CRC)) {
-        rx->counters[ARB_HOSTRX_BAD_SIZES]++;
+        count(rx, ARB_HOSTRX_BAD_SIZES);
         request->error = ARB_ERR_SIZE;
         return request->id == ARB_MSG_SET_PARAMETER && size > ARB_HOST_CRC && crc8_matches(bytes)
                    ? FRONT_TOO_LONG
@@ -135,7 +138,7 @@ static front_t look_at_front(arb_hostrx_t *rx, arb_hostrx_request_t *request)
 
 bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
 {
-    hunt(rx);
+    hunt(rx, rx->taken);
     while (rx->len != 0) {
         const front_t front = look_at_front(rx, request);
         if (front == FRONT_MESSAGE) {
@@ -146,11 +149,9 @@ bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
             if (!rx->overdue) {
                 return false;
             }
-            rx->counters[ARB_HOSTRX_GIVEN_UP]++;
+            count(rx, ARB_HOSTRX_GIVEN_UP);
         }
-        rx->counters[ARB_HOSTRX_GARBAGE]++;
-        rx->taken = 1;
-        hunt(rx);
+        hunt(rx, 1);
         if (front == FRONT_TOO_LONG) {
             return true;
         }

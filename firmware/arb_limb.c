@@ -20,6 +20,11 @@ typedef enum {
     STAGE_PLAN /* a plan for the host is carried out */
 } stage_t;
 
+static void on_link(void *ctx, uint8_t number, const profile_link_t *link);
+static void get_link(void *ctx, uint8_t k, profile_link_t *link);
+
+static const arb_config_user_t user = {.link = get_link, .sink = {.on_link = on_link}};
+
 static void apply_flags(arb_limb_t *limb, uint8_t flags)
 {
     limb->in_force = flags & ARB_FLAGS_STORED;
@@ -36,7 +41,7 @@ void arb_limb_init(arb_limb_t *limb, arb_nvm_t *nvm, uint8_t flags_on, uint8_t f
     limb->told = true;
     profile_run_init(&limb->run, now_ms);
     arb_flags_load(&limb->flags, nvm);
-    arb_config_init(&limb->config, nvm);
+    arb_config_init(&limb->config, nvm, &user, limb, now_ms);
     apply_flags(limb, (uint8_t)((arb_flags_get(&limb->flags) | flags_on) & ~flags_off));
 }
 
@@ -124,14 +129,6 @@ static uint8_t started(arb_limb_t *limb, stage_t stage, arb_config_status_t stat
     return error_of(status);
 }
 
-/* A job of arb_config has ended: what comes next begins with the next step. */
-static void on_done(void *ctx, arb_config_status_t status)
-{
-    arb_limb_t *limb = ctx;
-    limb->done = true;
-    limb->status = (int8_t)status;
-}
-
 /* --- Reading what is stored --- */
 
 static bool is_present(const pdcp_nodes_t *nodes, const profile_end_t *end, uint8_t transfer)
@@ -181,10 +178,9 @@ static void on_link(void *ctx, uint8_t number, const profile_link_t *link)
     }
 }
 
-static uint8_t read_all(arb_limb_t *limb, stage_t stage, uint32_t now_ms)
+static uint8_t read_all(arb_limb_t *limb, stage_t stage)
 {
-    static const profile_tlv_sink_t sink = {.on_link = on_link};
-    return started(limb, stage, arb_config_read(&limb->config, &sink, on_done, limb, now_ms));
+    return started(limb, stage, arb_config_read(&limb->config));
 }
 
 /* --- Start-up: which stored configuration (D-PRO-4) --- */
@@ -198,7 +194,7 @@ static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
 }
 
 /* The bus is quiet: the start-up begins. */
-static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
+static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     limb->arb = arb;
     limb->best = 0;
@@ -208,17 +204,17 @@ static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
     if (limb->config.stored == 0) {
         start(limb, arb, 0);
     } else {
-        (void)read_all(limb, STAGE_SCORE, now_ms); /* refused while busy: again with the next step */
+        (void)read_all(limb, STAGE_SCORE); /* refused while busy: again with the next step */
     }
 }
 
 /* All are scored. */
-static void end_score(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
+static void end_score(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     compare(limb);
     profile_run_load_begin(&limb->run, true);
     limb->number = limb->best;
-    if (limb->status != ARB_CONFIG_OK || limb->best == 0 || read_all(limb, STAGE_START, now_ms) != ARB_OK) {
+    if (limb->status != ARB_CONFIG_OK || limb->best == 0 || read_all(limb, STAGE_START) != ARB_OK) {
         start(limb, arb, 0);
     }
 }
@@ -241,13 +237,12 @@ static void get_link(void *ctx, uint8_t k, profile_link_t *link)
     profile_links_get(&limb->run.links, k, link);
 }
 
-static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
+static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb)
 {
     if (!profile_run_take_up(&limb->run, arb)) {
         return ARB_ERR_STORAGE;
     }
-    const arb_config_status_t status =
-        arb_config_save(&limb->config, &limb->number, limb->run.links.count, get_link, on_done, limb, now_ms);
+    const arb_config_status_t status = arb_config_save(&limb->config, &limb->number, limb->run.links.count);
     if (status == ARB_CONFIG_OK) {
         limb->run.frozen = true;
     }
@@ -266,17 +261,17 @@ static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
     end(limb, error_of((arb_config_status_t)limb->status));
 }
 
-static uint8_t begin_load(arb_limb_t *limb, uint32_t now_ms)
+static uint8_t begin_load(arb_limb_t *limb)
 {
     limb->score = 0;
-    return arb_config_has(&limb->config, limb->number) ? read_all(limb, STAGE_CHECK, now_ms) : ARB_ERR_NUMBER;
+    return arb_config_has(&limb->config, limb->number) ? read_all(limb, STAGE_CHECK) : ARB_ERR_NUMBER;
 }
 
 /* The memory can be read, and there is room: now the links go into the table. */
-static void end_check(arb_limb_t *limb, uint32_t now_ms)
+static void end_check(arb_limb_t *limb)
 {
     if (limb->status != ARB_CONFIG_OK || limb->score > PROFILE_LINKS_MAX ||
-        read_all(limb, STAGE_LOAD, now_ms) != ARB_OK) {
+        read_all(limb, STAGE_LOAD) != ARB_OK) {
         end(limb, ARB_ERR_STORAGE);
         return;
     }
@@ -302,9 +297,9 @@ static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
     limb->unsaved = false;
 }
 
-static uint8_t begin_erase(arb_limb_t *limb, uint32_t now_ms)
+static uint8_t begin_erase(arb_limb_t *limb)
 {
-    return started(limb, STAGE_ERASE, arb_config_erase(&limb->config, limb->number, on_done, limb, now_ms));
+    return started(limb, STAGE_ERASE, arb_config_erase(&limb->config, limb->number));
 }
 
 static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
@@ -337,7 +332,7 @@ bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb)
     return profile_run_is_starting(&limb->run, arb);
 }
 
-uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t action, uint8_t argument)
+uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t action, uint8_t argument)
 {
     uint8_t what = PROFILE_PLAN_ENFORCE;
     limb->ended = false;
@@ -346,11 +341,11 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t
     limb->number = argument != 0 ? argument : limb->active;
     switch ((arb_action_t)action) {
     case ARB_ACTION_SAVE:
-        return begin_save(limb, arb, now_ms);
+        return begin_save(limb, arb);
     case ARB_ACTION_LOAD:
-        return begin_load(limb, now_ms);
+        return begin_load(limb);
     case ARB_ACTION_ERASE:
-        return begin_erase(limb, now_ms);
+        return begin_erase(limb);
     case ARB_ACTION_ADOPT:
         limb->result = profile_run_adopt(&limb->run, arb);
         end(limb, ARB_OK);
@@ -384,19 +379,18 @@ void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms,
     profile_run_on_event(&limb->run, arb, now_ms, event);
 }
 
-/* A job of arb_config has ended. */
-static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms)
+/* A job of arb_config has ended; at another stage it was the host's. */
+static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb)
 {
-    limb->done = false;
     switch ((stage_t)limb->stage) {
     case STAGE_SCORE:
-        end_score(limb, arb, now_ms);
+        end_score(limb, arb);
         break;
     case STAGE_START:
         end_start(limb, arb);
         break;
     case STAGE_CHECK:
-        end_check(limb, now_ms);
+        end_check(limb);
         break;
     case STAGE_LOAD:
         end_load(limb, arb);
@@ -430,19 +424,19 @@ static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
     if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->save_ms)) {
         limb->save_ms = now_ms + ARB_LIMB_AUTO_SAVE_MS; /* if it fails, again after the same time */
         limb->number = limb->active;
-        (void)begin_save(limb, arb, now_ms);
+        (void)begin_save(limb, arb);
     }
 }
 
 bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t now_ms)
 {
-    arb_config_step(&limb->config, nvm, now_ms);
+    limb->status = (int8_t)arb_config_step(&limb->config, nvm, now_ms);
     arb_flags_step(&limb->flags, nvm, now_ms);
-    if (limb->done) {
-        next_stage(limb, arb, now_ms);
+    if (limb->status != ARB_CONFIG_ERR_BUSY) {
+        next_stage(limb, arb);
     }
     if (limb->stage == STAGE_IDLE && profile_run_is_quiet(&limb->run, arb, now_ms)) {
-        begin_start(limb, arb, now_ms);
+        begin_start(limb, arb);
     }
     const bool handed = profile_run_step(&limb->run, arb, now_ms);
     if (limb->stage == STAGE_PLAN && limb->run.state != PROFILE_CONFIGURING) {

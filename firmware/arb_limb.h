@@ -36,8 +36,7 @@ typedef struct {
     uint8_t active;   /* configuration, 0: none */
     uint8_t stage;    /* arb_limb.c: what is under way */
     uint8_t number;   /* configuration that is being read, saved, loaded or erased */
-    bool done;        /* a job of arb_config has ended, with status */
-    int8_t status;    /* arb_config_status_t */
+    int8_t status;    /* of the job of arb_config that has ended: arb_config_status_t */
     bool ended;       /* what the host waits for is there: */
     uint8_t error;    /* arb_error_t */
     uint16_t result;
@@ -74,7 +73,7 @@ bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb);
 /* Begins an action for the host; nothing may be under way. ARB_OK: arb_limb_take_outcome will say how it
  * went. Otherwise an error, and nothing was begun: ARB_ERR_NUMBER, no such configuration; ARB_ERR_VALUE, no
  * such action; ARB_ERR_BUSY, try again. */
-uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint32_t now_ms, uint8_t action, uint8_t argument);
+uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t action, uint8_t argument);
 
 /* True, once, when the action has ended: error is ARB_OK or an error, result what 2408h says. */
 bool arb_limb_take_outcome(arb_limb_t *limb, uint8_t *error, uint16_t *result);

@@ -3,7 +3,6 @@
 #include <string.h>
 
 #include "arb_hostcodec.h"
-#include "pdcp_time.h"
 
 /* A larger table needs another layout: a negative array size does not compile. */
 typedef char arb_store_fits_its_place[ARB_AREAS * ARB_STORE_AREA <= ARB_NVM_FLAGS_AT ? 1 : -1];
@@ -63,9 +62,4 @@ void arb_store_step(arb_store_t *store, const pdcp_bind_t *bind, uint32_t now_ms
         store->failures++;
         arb_store_touch(store, now_ms);
     }
-}
-
-uint32_t arb_store_next_ms(const arb_store_t *store, uint32_t now_ms)
-{
-    return store->changed ? store->due_ms : now_ms + PDCP_TIME_FAR_MS;
 }

@@ -17,6 +17,7 @@
 
 #include "arb_area.h"
 #include "pdcp_bind.h"
+#include "pdcp_time.h"
 
 enum {
     ARB_STORE_ENTRY = 7,
@@ -49,6 +50,9 @@ void arb_store_touch(arb_store_t *store, uint32_t now_ms);
 void arb_store_step(arb_store_t *store, const pdcp_bind_t *bind, uint32_t now_ms);
 
 /* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to write. */
-uint32_t arb_store_next_ms(const arb_store_t *store, uint32_t now_ms);
+static inline uint32_t arb_store_next_ms(const arb_store_t *store, uint32_t now_ms)
+{
+    return store->changed ? store->due_ms : now_ms + PDCP_TIME_FAR_MS;
+}
 
 #endif

@@ -25,6 +25,8 @@ static arb_flags_t flags;
 static arb_store_t store;
 static pdcp_bind_t bind;
 static uint32_t now_ms;
+static uint16_t saved_kind; /* of the links of the configuration that is saved */
+static const arb_config_user_t user;
 static arb_config_status_t outcome;
 
 static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
@@ -57,7 +59,7 @@ static void power_on(bool keep)
     arb_nvm_init(&nvm, &port);
     arb_store_load(&store, &nvm, &bind);
     arb_flags_load(&flags, &nvm);
-    arb_config_init(&config, &nvm);
+    arb_config_init(&config, &nvm, &user, &saved_kind, now_ms);
 }
 
 void setUp(void)
@@ -76,16 +78,10 @@ static void settle(void)
     for (int steps = 0; arb_config_busy(&config) || store.changed || flags.flags != flags.stored; steps++) {
         TEST_ASSERT_LESS_THAN(STEPS_MAX, steps);
         now_ms++;
-        arb_config_step(&config, &nvm, now_ms);
+        (void)arb_config_step(&config, &nvm, now_ms);
         arb_store_step(&store, &bind, now_ms);
         arb_flags_step(&flags, &nvm, now_ms);
     }
-}
-
-static void on_done(void *ctx, arb_config_status_t status)
-{
-    (void)ctx;
-    outcome = status;
 }
 
 /* All links of a configuration are of one kind. */
@@ -104,19 +100,22 @@ static arb_config_status_t run(arb_config_status_t started)
     for (int steps = 0; arb_config_busy(&config); steps++) {
         TEST_ASSERT_LESS_THAN(STEPS_MAX, steps);
         now_ms++;
-        arb_config_step(&config, &nvm, now_ms);
+        outcome = arb_config_step(&config, &nvm, now_ms);
     }
     return outcome;
 }
 
+static const arb_config_user_t user = {.link = get_link};
+
 static arb_config_status_t save(uint8_t number, uint8_t count, uint16_t kind)
 {
-    return run(arb_config_save(&config, &number, count, get_link, on_done, &kind, now_ms));
+    saved_kind = kind;
+    return run(arb_config_save(&config, &number, count));
 }
 
 static arb_config_status_t erase(uint8_t number)
 {
-    return run(arb_config_erase(&config, number, on_done, NULL, now_ms));
+    return run(arb_config_erase(&config, number));
 }
 
 typedef struct {
@@ -238,8 +237,7 @@ static void test_string_too_long_is_refused(void)
 {
     static const uint8_t piece[ARB_PORT_NVM_PAGE] = {PROFILE_TLV_CONFIGURATIONS};
     TEST_ASSERT_EQUAL_INT(ARB_CONFIG_ERR_STORAGE,
-                          arb_config_write_raw(&config, 0, ARB_CONFIG_STRING_MAX + 1, piece, sizeof piece,
-                                               on_done, NULL, now_ms));
+                          arb_config_write_raw(&config, 0, ARB_CONFIG_STRING_MAX + 1, piece, sizeof piece));
 }
 
 static void store_all(void)

@@ -68,6 +68,7 @@ static arb_nvm_t nvm;
 static arb_config_t config;
 static uint32_t now_ms;
 static uint16_t first_type; /* of the links that a test saves */
+static const arb_config_user_t user;
 
 static void power_on(void)
 {
@@ -77,7 +78,7 @@ static void power_on(void)
     bad_byte = -1;
     lost_page = -1;
     arb_nvm_init(&nvm, &port);
-    arb_config_init(&config, &nvm);
+    arb_config_init(&config, &nvm, &user, NULL, now_ms);
 }
 
 void setUp(void)
@@ -95,11 +96,13 @@ void tearDown(void) {}
 static int done_count;
 static arb_config_status_t outcome;
 
-static void on_done(void *ctx, arb_config_status_t result)
+static void step(void)
 {
-    (void)ctx;
-    done_count++;
-    outcome = result;
+    const arb_config_status_t result = arb_config_step(&config, &nvm, now_ms);
+    if (result != ARB_CONFIG_ERR_BUSY) {
+        done_count++;
+        outcome = result;
+    }
 }
 
 /* Runs the job that was started; returns how it ended. Each step is short. */
@@ -112,7 +115,7 @@ static arb_config_status_t run(arb_config_status_t started)
         TEST_ASSERT_LESS_THAN(2000, steps);
         now_ms = arb_config_next_ms(&config, now_ms);
         read_most = 0;
-        arb_config_step(&config, &nvm, now_ms);
+        step();
         TEST_ASSERT_LESS_OR_EQUAL(128, read_most);
         TEST_ASSERT_LESS_OR_EQUAL(1, writes - before);
     }
@@ -138,17 +141,17 @@ static void get_link(void *ctx, uint8_t k, profile_link_t *link)
 static arb_config_status_t save(uint8_t number, uint8_t count, uint16_t type)
 {
     first_type = type;
-    return run(arb_config_save(&config, &number, count, get_link, on_done, NULL, now_ms));
+    return run(arb_config_save(&config, &number, count));
 }
 
 static arb_config_status_t erase(uint8_t number)
 {
-    return run(arb_config_erase(&config, number, on_done, NULL, now_ms));
+    return run(arb_config_erase(&config, number));
 }
 
 static arb_config_status_t write_raw(const uint8_t *bytes, uint16_t len)
 {
-    return run(arb_config_write_raw(&config, 0, len, bytes, len, on_done, NULL, now_ms));
+    return run(arb_config_write_raw(&config, 0, len, bytes, len));
 }
 
 static void expect_now(const uint8_t *wanted, uint16_t len)
@@ -234,8 +237,7 @@ static void test_number_0_takes_the_lowest_free_number(void)
     (void)save(3, 0, 0);
     for (uint8_t wanted = 2; wanted <= 4; wanted = (uint8_t)(wanted + 2)) {
         uint8_t number = 0;
-        TEST_ASSERT_EQUAL(ARB_CONFIG_OK,
-                          run(arb_config_save(&config, &number, 0, get_link, on_done, NULL, now_ms)));
+        TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_save(&config, &number, 0)));
         TEST_ASSERT_EQUAL(wanted, number);
     }
     EXPECT(1, 4, 0, 2, 1, 0, 3, 0, 0, 2, 3, 0, 3, 0, 0, 2, 2, 0, 3, 0, 0, 2, 4, 0, 3, 0, 0, 15, 0, 0);
@@ -253,14 +255,12 @@ static void test_the_numbers_end_at_255(void)
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, write_raw(string, sizeof string));
     TEST_ASSERT_EQUAL(255, config.stored);
     uint8_t number = 0;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE,
-                      arb_config_save(&config, &number, 0, get_link, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, arb_config_save(&config, &number, 0));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, save(255, 1, 0));
     TEST_ASSERT_EQUAL(sizeof string + 3 + 57, arb_config_length(&config));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, erase(255));
     TEST_ASSERT_EQUAL(254, config.stored);
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK,
-                      run(arb_config_save(&config, &number, 0, get_link, on_done, NULL, now_ms)));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_save(&config, &number, 0)));
     TEST_ASSERT_EQUAL(255, number);
 }
 
@@ -303,8 +303,8 @@ static void test_erase(void)
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, erase(1));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, erase(3));
     EXPECT(1, 0, 0, 15, 0, 0);
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_NUMBER, arb_config_erase(&config, 3, on_done, NULL, now_ms));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_NUMBER, arb_config_erase(&config, 0, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_NUMBER, arb_config_erase(&config, 3));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_NUMBER, arb_config_erase(&config, 0));
     TEST_ASSERT_FALSE(arb_config_busy(&config));
 }
 
@@ -343,7 +343,8 @@ static void on_link(void *ctx, uint8_t number, const profile_link_t *link)
     TEST_ASSERT_EQUAL_HEX16(0x2120, link->output.profile);
 }
 
-static const profile_tlv_sink_t sink = {.on_configuration = on_configuration, .on_link = on_link};
+static const arb_config_user_t user = {.link = get_link,
+                                       .sink = {.on_configuration = on_configuration, .on_link = on_link}};
 
 static void test_all_links_are_read_in_order(void)
 {
@@ -352,7 +353,7 @@ static void test_all_links_are_read_in_order(void)
     (void)save(9, 3, 0x5320);
     power_on();
     told_len = 0;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_read(&config, &sink, on_done, NULL, now_ms)));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_read(&config)));
     TEST_ASSERT_EQUAL(13, told_len);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(((const uint8_t[]){2, 2, 0x10, 2, 0x11, 1, 9, 9, 0x20, 9, 0x21, 9, 0x22}),
                                  told, 13);
@@ -362,7 +363,7 @@ static void test_all_links_are_read_in_order(void)
 static void test_an_empty_memory_has_nothing_to_hand_over(void)
 {
     told_len = 0;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_read(&config, &sink, on_done, NULL, now_ms)));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_read(&config)));
     TEST_ASSERT_EQUAL(0, told_len);
 }
 
@@ -411,8 +412,7 @@ static arb_config_status_t write_pieces(const uint8_t *bytes, uint16_t len, uint
 {
     for (uint16_t at = 0;; at = (uint16_t)(at + size)) {
         const uint16_t n = len - at < size ? (uint16_t)(len - at) : size;
-        const arb_config_status_t result =
-            run(arb_config_write_raw(&config, at, len, &bytes[at], n, on_done, NULL, now_ms));
+        const arb_config_status_t result = run(arb_config_write_raw(&config, at, len, &bytes[at], n));
         if (at + n == len || result != ARB_CONFIG_OK) {
             return result;
         }
@@ -477,8 +477,7 @@ static void test_raw_writing_of_another_length(void)
 static void test_pieces_out_of_order_are_refused(void)
 {
     const uint16_t len = make_string(string, 1, 6, 0x5300);
-#define PIECE(offset, total, size)                                                                           \
-    arb_config_write_raw(&config, offset, total, &string[offset], size, on_done, NULL, now_ms)
+#define PIECE(offset, total, size) arb_config_write_raw(&config, offset, total, &string[offset], size)
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_VALUE, PIECE(100, len, 100)); /* nothing was begun */
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_VALUE, PIECE(0, len, 0));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_VALUE, PIECE(0, 0, 0));
@@ -516,7 +515,7 @@ static void test_a_save_abandons_the_hosts_write_and_a_read_does_not(void)
     uint8_t bytes[8];
     uint8_t n = 8;
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(PIECE(0, len, 100)));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_read(&config, &sink, on_done, NULL, now_ms)));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_read(&config)));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_read_raw(&config, &nvm, 0, bytes, &n));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(PIECE(100, len, 100)));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, save(1, 1, 0x5300));
@@ -533,32 +532,40 @@ static void test_one_job_at_a_time(void)
     uint8_t bytes[8];
     uint8_t n = 8;
     TEST_ASSERT_EQUAL(now_ms + 0x3FFFFFFFu, arb_config_next_ms(&config, now_ms));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 1, get_link, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 1));
     TEST_ASSERT_EQUAL(now_ms, arb_config_next_ms(&config, now_ms));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY,
-                      arb_config_save(&config, &number, 1, get_link, on_done, NULL, now_ms));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_erase(&config, 1, on_done, NULL, now_ms));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_read(&config, &sink, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_save(&config, &number, 1));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_erase(&config, 1));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_read(&config));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, PIECE(0, 100, 100));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_read_raw(&config, &nvm, 0, bytes, &n));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(ARB_CONFIG_OK));
     EXPECT(1, 1, 0, 2, 1, 0, 3, 1, 0, LINK(1, 0), 15, 0, 0);
 }
 
-static void start_next(void *ctx, arb_config_status_t result)
-{
-    uint8_t number = 2;
-    TEST_ASSERT_EQUAL_PTR(&config, ctx);
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, result);
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 0, get_link, on_done, ctx, now_ms));
-}
-
-static void test_done_may_start_the_next_job(void)
+/* With the step that has ended the first one; it is due at once, too. */
+static void test_one_job_after_the_other(void)
 {
     uint8_t number = 1;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK,
-                      run(arb_config_save(&config, &number, 0, get_link, start_next, &config, now_ms)));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_save(&config, &number, 0)));
+    number = 2;
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 0));
+    TEST_ASSERT_EQUAL(now_ms, arb_config_next_ms(&config, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(ARB_CONFIG_OK));
     EXPECT(1, 2, 0, 2, 1, 0, 3, 0, 0, 2, 2, 0, 3, 0, 0, 15, 0, 0);
+}
+
+/* Half the range of the clock after anything was stored. */
+static void test_a_job_after_a_long_time_is_due_at_once(void)
+{
+    (void)save(1, 0, 0x5300);
+    for (int i = 0; i < 3; i++) {
+        now_ms += 0x3FFFFFFFu;
+        step();
+    }
+    uint8_t number = 2;
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 0));
+    TEST_ASSERT_EQUAL(now_ms, arb_config_next_ms(&config, now_ms));
 }
 
 /* Whichever write fails: the memory says so, or a byte keeps its value and nobody says so. */
@@ -620,7 +627,7 @@ static void test_damage_at_run_time_is_noticed(void)
     (void)save(1, 1, 0x5300);
     memory[0][64 + 20] ^= 1;
     writes = 0;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, run(arb_config_read(&config, &sink, on_done, NULL, now_ms)));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, run(arb_config_read(&config)));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(2, 1, 0x5300));
     TEST_ASSERT_EQUAL(0, writes);
 }
@@ -632,9 +639,9 @@ static void test_the_memory_is_shared(void)
     uint8_t n = 8;
     TEST_ASSERT_TRUE(arb_nvm_take(&nvm, ARB_NVM_STORE));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_BUSY, arb_config_read_raw(&config, &nvm, 0, bytes, &n));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 1, get_link, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 1));
     for (int i = 0; i < 30; i++) {
-        arb_config_step(&config, &nvm, now_ms);
+        step();
         now_ms = arb_config_next_ms(&config, now_ms);
     }
     TEST_ASSERT_EQUAL(0, writes);
@@ -643,7 +650,7 @@ static void test_the_memory_is_shared(void)
     busy = 3;
     status = -1;
     arb_nvm_give(&nvm, ARB_NVM_STORE);
-    arb_config_step(&config, &nvm, now_ms);
+    step();
     TEST_ASSERT_FALSE(arb_nvm_take(&nvm, ARB_NVM_STORE));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(ARB_CONFIG_OK));
     TEST_ASSERT_TRUE(arb_nvm_take(&nvm, ARB_NVM_STORE));
@@ -654,11 +661,11 @@ static void test_a_memory_that_is_never_free_ends_the_job(void)
 {
     (void)arb_nvm_take(&nvm, ARB_NVM_FLAGS);
     uint8_t number = 1;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 1, get_link, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 1));
     done_count = 0;
     for (int i = 0; i < 100 && done_count == 0; i++) {
         now_ms = arb_config_next_ms(&config, now_ms);
-        arb_config_step(&config, &nvm, now_ms);
+        step();
     }
     TEST_ASSERT_EQUAL(1, done_count);
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, outcome);
@@ -694,7 +701,8 @@ int main(void)
     RUN_TEST(test_a_bad_string_changes_nothing);
     RUN_TEST(test_a_save_abandons_the_hosts_write_and_a_read_does_not);
     RUN_TEST(test_one_job_at_a_time);
-    RUN_TEST(test_done_may_start_the_next_job);
+    RUN_TEST(test_one_job_after_the_other);
+    RUN_TEST(test_a_job_after_a_long_time_is_due_at_once);
     RUN_TEST(test_a_failing_write_changes_nothing);
     RUN_TEST(test_a_byte_that_cannot_be_written_is_noticed);
     RUN_TEST(test_a_lost_header_is_noticed);

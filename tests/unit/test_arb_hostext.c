@@ -286,19 +286,13 @@ static void test_many_bytes_are_read_in_steps(void)
     expect(0x240B, answer, sizeof answer);
 }
 
-static void on_erased(void *ctx, arb_config_status_t status)
-{
-    (void)ctx;
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, status);
-}
-
 /* A string that becomes another one while it is read is read anew. */
 static void test_a_string_that_changes_is_read_anew(void)
 {
     uint8_t string[LONG];
     write_long_string(string);
     ask(0x240A, BYTES(0, 0, 128));
-    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_erase(&app.limb.config, 3, on_erased, NULL, x.now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_erase(&app.limb.config, 3));
     wait_for_answer();
     expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
 }

@@ -16,12 +16,14 @@ static arb_port_t port;
 static arb_nvm_t nvm;
 static arb_config_t config;
 static uint32_t now_ms;
+static uint16_t saved_type; /* of the links of the configuration that is saved */
+static const arb_config_user_t user;
 
 static void power_on(void)
 {
     sim_nvm_power_on(&memory);
     arb_nvm_init(&nvm, &port);
-    arb_config_init(&config, &nvm);
+    arb_config_init(&config, &nvm, &user, &saved_type, now_ms);
 }
 
 void setUp(void)
@@ -46,12 +48,6 @@ typedef struct {
 
 static arb_config_status_t outcome;
 
-static void on_done(void *ctx, arb_config_status_t status)
-{
-    (void)ctx;
-    outcome = status;
-}
-
 static arb_config_status_t run(arb_config_status_t started)
 {
     if (started < 0) {
@@ -60,7 +56,7 @@ static arb_config_status_t run(arb_config_status_t started)
     for (int steps = 0; arb_config_busy(&config); steps++) {
         TEST_ASSERT_LESS_THAN(5000, steps);
         now_ms = arb_config_next_ms(&config, now_ms);
-        arb_config_step(&config, &nvm, now_ms);
+        outcome = arb_config_step(&config, &nvm, now_ms);
     }
     return outcome;
 }
@@ -75,14 +71,17 @@ static void get_link(void *ctx, uint8_t k, profile_link_t *link)
         .owner = {.vid = 2, .pid = 2, .sn = *type}, .type = 0x5000, .profile = 0x2120, .index = 1};
 }
 
+static const arb_config_user_t user = {.link = get_link};
+
 static arb_config_status_t save(uint8_t number, uint8_t count, uint16_t type)
 {
-    return run(arb_config_save(&config, &number, count, get_link, on_done, &type, now_ms));
+    saved_type = type;
+    return run(arb_config_save(&config, &number, count));
 }
 
 static arb_config_status_t erase(uint8_t number)
 {
-    return run(arb_config_erase(&config, number, on_done, NULL, now_ms));
+    return run(arb_config_erase(&config, number));
 }
 
 static arb_config_status_t write_raw(const string_t *string, uint16_t size)
@@ -90,8 +89,8 @@ static arb_config_status_t write_raw(const string_t *string, uint16_t size)
     arb_config_status_t status = ARB_CONFIG_OK;
     for (uint16_t at = 0; at < string->len && status == ARB_CONFIG_OK; at = (uint16_t)(at + size)) {
         const uint16_t left = (uint16_t)(string->len - at);
-        status = run(arb_config_write_raw(&config, at, string->len, &string->bytes[at],
-                                          left < size ? left : size, on_done, NULL, now_ms));
+        status = run(
+            arb_config_write_raw(&config, at, string->len, &string->bytes[at], left < size ? left : size));
     }
     return status;
 }
@@ -365,7 +364,7 @@ static void test_a_memory_that_cannot_be_read_counts_as_empty(void)
 {
     (void)save(1, 2, 0x5300);
     memory.reads_fail = true;
-    arb_config_init(&config, &nvm);
+    arb_config_init(&config, &nvm, &user, &saved_type, now_ms);
     TEST_ASSERT_EQUAL(0, config.stored);
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(2, 1, 0x5300));
 }
@@ -420,8 +419,8 @@ static void test_more_than_an_area_holds_changes_nothing(void)
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(2, 1, 0x5300));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(1, 255, 0x5300));
     TEST_ASSERT_EQUAL(2, config.counters[ARB_CONFIG_FAILURES]);
-    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, arb_config_write_raw(&config, 0, ARB_CONFIG_STRING_MAX + 1,
-                                                                   string.bytes, 100, on_done, NULL, now_ms));
+    TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE,
+                      arb_config_write_raw(&config, 0, ARB_CONFIG_STRING_MAX + 1, string.bytes, 100));
     TEST_ASSERT_EQUAL(writes, memory.writes);
     expect_string(&string);
     power_on();
@@ -596,7 +595,7 @@ static void test_cuts_of_the_flags(void)
 static void test_three_users_of_one_memory(void)
 {
     for (uint32_t failing = 0; failing < 14; failing++) {
-        uint16_t type = 0x5300;
+        saved_type = 0x5300;
         uint8_t number = 1;
         setUp();
         load_store();
@@ -606,12 +605,14 @@ static void test_three_users_of_one_memory(void)
         remember(5, 5);
         arb_store_touch(&store, now_ms - ARB_STORE_DELAY_MS);
         arb_flags_set(&flags, 0x08, now_ms);
-        TEST_ASSERT_EQUAL(ARB_CONFIG_OK,
-                          arb_config_save(&config, &number, 9, get_link, on_done, &type, now_ms));
+        TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 9));
         outcome = ARB_CONFIG_ERR_BUSY;
         for (int i = 0; i < 3000; i++) {
             memory.fail_after = memory.failed ? SIM_NVM_NEVER : memory.fail_after;
-            arb_config_step(&config, &nvm, now_ms);
+            const arb_config_status_t status = arb_config_step(&config, &nvm, now_ms);
+            if (status != ARB_CONFIG_ERR_BUSY) {
+                outcome = status;
+            }
             arb_store_step(&store, &bind, now_ms);
             arb_flags_step(&flags, &nvm, now_ms);
             now_ms++;
@@ -704,7 +705,7 @@ static arb_config_status_t change_at_random(model_t *model)
             model_erase(model, number);
             return erase(number);
         }
-        return arb_config_erase(&config, number, on_done, NULL, now_ms);
+        return arb_config_erase(&config, number);
     case 1:
         model->count = 0;
         for (uint32_t i = random_below(4); i > 0; i--) {
@@ -730,8 +731,8 @@ static void disturb_at_random(const model_t *model)
     } else if (string.len > 6) {
         const uint16_t len = (uint16_t)(1 + random_below(string.len - 1u));
         string.bytes[random_below(len)] ^= 0x10;
-        TEST_ASSERT_EQUAL(ARB_CONFIG_OK, run(arb_config_write_raw(&config, 0, string.len, string.bytes, len,
-                                                                  on_done, NULL, now_ms)));
+        TEST_ASSERT_EQUAL(ARB_CONFIG_OK,
+                          run(arb_config_write_raw(&config, 0, string.len, string.bytes, len)));
     }
 }
 

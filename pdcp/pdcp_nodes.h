@@ -142,7 +142,7 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
 void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
 
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
-void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, uint8_t channel, uint8_t node_id);
+void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id);
 
 /* Is the node id the device's own (true), or that of one of its outputs (false)? node: place of the owner,
  * PDCP_NONE: nobody has this id. */
@@ -153,13 +153,8 @@ static inline bool pdcp_nodes_owner(const pdcp_nodes_t *nodes, uint8_t node_id, 
     return (owner & 0x80u) == 0;
 }
 
-/* A device counts from its first beacon, its channels when it is set up (D-API-6). */
-static inline bool pdcp_nodes_device_counts(const pdcp_node_t *node)
-{
-    return node->beaconed && node->state != PDCP_NODE_FREE && node->state != PDCP_NODE_LOST;
-}
-
-/* What counts for the host. A link is named by its input's channel number. */
+/* What counts for the host: a device from its first beacon until it is lost, its channels when it is set up
+ * (D-API-6). A link is named by its input's channel number. */
 enum {
     PDCP_COUNTS_LINK = 0,
     PDCP_COUNTS_INPUT = PDCP_INPUT,

@@ -87,11 +87,11 @@ static void no_room(pdcp_bus_t *bus, pdcp_node_t *device)
 /* Writes of the setup: transfer enabled 0, and the node id of an output. */
 static void write_step(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param)
 {
-    const pdcp_channel_t *channel = current_channel(bus, device);
+    pdcp_channel_t *channel = current_channel(bus, device);
     uint8_t value = 0;
     if (param == PDCP_OUT_NODE_ID) {
         if (channel->node_id == 0) {
-            pdcp_nodes_set_output_id(&bus->nodes, device->setup_channel, pdcp_bind_output_id(bus));
+            pdcp_nodes_set_output_id(&bus->nodes, channel, pdcp_bind_output_id(bus));
         }
         value = channel->node_id;
         if (value == 0) {
@@ -206,7 +206,7 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
         return false;
     }
     if (channel->transfer != 0 && channel->transfer != transfer) {
-        pdcp_nodes_set_output_id(&bus->nodes, number, 0);
+        pdcp_nodes_set_output_id(&bus->nodes, channel, 0);
         pdcp_nodes_drop_feed(&bus->nodes, number);
         channel->link = PDCP_LINK_NONE;
         channel->todo = PDCP_TODO_NONE;
@@ -264,15 +264,20 @@ static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply
 pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
 {
     pdcp_node_t *device = pdcp_bus_node(bus, node);
-    const bool has_value = reply->status == PDCP_OK; /* or a piece of one */
-    const bool mandatory = (current_step(bus, device) & MANDATORY) != 0;
-    if (has_value ? !take(bus, device, reply) : mandatory || reply->status == PDCP_ERR_NO_ANSWER) {
+    bool done_well = false;
+    if (reply->status == PDCP_OK) { /* a value, or a piece of one */
+        done_well = take(bus, device, reply);
+    } else if (reply->status != PDCP_ERR_NO_ANSWER) {
+        done_well = (current_step(bus, device) & MANDATORY) == 0;
+    }
+    if (!done_well) {
         pdcp_request_cancel(bus, node);
         fail(bus, device);
-        const bool names_device = device->setup_pass == PASS_DEVICE && reply->param <= PDCP_DEV_SERIAL;
-        return has_value && names_device ? PDCP_ERR_UNKNOWN : PDCP_OK;
-    }
-    if (reply->done) {
+        if (reply->status == PDCP_OK && device->setup_pass == PASS_DEVICE &&
+            reply->param <= PDCP_DEV_SERIAL) {
+            return PDCP_ERR_UNKNOWN;
+        }
+    } else if (reply->done) {
         go_on(bus, device);
     }
     return PDCP_OK;

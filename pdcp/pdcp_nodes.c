@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "pdcp_codec.h"
+
 /* Makes a place free. */
 static void clear_place(pdcp_node_t *node, uint8_t place)
 {
@@ -127,12 +129,14 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
     input->source_profile = 0;
 }
 
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
+void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
 {
-    if (param == PDCP_IN_SOURCE_VID_PID) {
+    const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
+    const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
+    if (reply->param == PDCP_IN_SOURCE_VID_PID) {
         input->source.vid = low;
         input->source.pid = high;
-    } else if (param == PDCP_IN_SOURCE_SERIAL) {
+    } else if (reply->param == PDCP_IN_SOURCE_SERIAL) {
         input->source.sn = low;
         input->source_index = (uint8_t)(high & 0xFFu);
     } else {
@@ -197,7 +201,9 @@ bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node)
     pdcp_node_t *owner = &nodes->nodes[node];
     uint16_t inputs = 0;
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-        inputs = (uint16_t)(inputs + (nodes->channels[c].transfer == PDCP_INPUT ? 1u : 0u));
+        if (nodes->channels[c].transfer == PDCP_INPUT) {
+            inputs++;
+        }
     }
     drop_needs(nodes, owner);
     const uint16_t stride = (uint16_t)((inputs + 7u) / 8u);
@@ -224,18 +230,17 @@ static uint8_t mask_of(uint16_t bit)
     return (uint8_t)(0x80u >> (bit % 8u));
 }
 
-void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
-                          const uint8_t *bytes, uint16_t len)
+void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, const pdcp_reply_t *reply)
 {
     const pdcp_channel_t *needing = &nodes->channels[channel];
     const pdcp_node_t *owner = &nodes->nodes[needing->node];
-    uint8_t *set = &nodes->needs[set_at(owner, needing, desired)];
+    uint8_t *set = &nodes->needs[set_at(owner, needing, reply->param == PDCP_CH_DESIRED)];
     uint16_t bit = 0; /* of an input in a set of its device */
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
         const pdcp_channel_t *input = &nodes->channels[c];
         if (input->transfer == PDCP_INPUT) {
-            const uint16_t from = (uint16_t)(input->index - 8u * offset); /* large before the offset */
-            if (from / 8u < len && (bytes[from / 8u] & mask_of(from)) != 0) {
+            const uint16_t from = (uint16_t)(input->index - 8u * reply->offset); /* large before the offset */
+            if (from / 8u < reply->len && (reply->bytes[from / 8u] & mask_of(from)) != 0) {
                 set[bit / 8u] |= mask_of(bit);
             }
             bit++;
@@ -253,7 +258,7 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
         const pdcp_channel_t *input = &nodes->channels[c];
         if (input->transfer == PDCP_INPUT) {
             if (input->index == index) {
-                return owner->needs_stride != 0 && (set[bit / 8u] & mask_of(bit)) != 0;
+                return (set[bit / 8u] & mask_of(bit)) != 0;
             }
             bit++;
         }

@@ -266,8 +266,8 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
     return false;
 }
 
-/* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE: there
- * are fewer. number 0: how many there are. */
+/* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE:
+ * there are fewer. number 0: how many there are. */
 static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
 {
     uint8_t count = 0;

@@ -133,7 +133,8 @@ bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
  * device are dropped (D-BUS-13). */
 void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, const pdcp_reply_t *reply);
 
-/* Does channel need (or desire) the input with this index of its own device, which must have room for needs? */
+/* Does channel need (or desire) the input with this index of its own device, which must have room for needs?
+ */
 bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index);
 
 /* No input is fed by this channel any more: it is gone, or no output now. */

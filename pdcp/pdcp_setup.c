@@ -263,9 +263,8 @@ static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply
     }
     const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
     const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
-    return device->setup_pass == PASS_DEVICE
-               ? take_device(bus, device, reply->param, low, high)
-               : take_channel(bus, device->setup_channel, reply, low, high);
+    return device->setup_pass == PASS_DEVICE ? take_device(bus, device, reply->param, low, high)
+                                             : take_channel(bus, device->setup_channel, reply, low, high);
 }
 
 pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)

@@ -41,13 +41,12 @@ static i2c1_status_t wait_for_bus(void)
     return status;
 }
 
-/* Starts a transfer: the address, and the bytes of a page that stand behind it. Nobody else uses the bus, and
- * the last transfer is over. */
-static void start(hal_nvm_t *self, uint16_t address, uint16_t out_size, uint8_t *in, uint16_t in_size)
+/* Starts a transfer: the address, and the bytes of a page that stand behind it. */
+static bool start(hal_nvm_t *self, uint16_t address, uint16_t out_size, uint8_t *in, uint16_t in_size)
 {
     self->bytes[0] = (uint8_t)(address >> 8);
     self->bytes[1] = (uint8_t)address;
-    (void)i2c1_start(EEPROM, self->bytes, (uint8_t)(ADDRESS_BYTES + out_size), in, (uint8_t)in_size);
+    return i2c1_start(EEPROM, self->bytes, (uint8_t)(ADDRESS_BYTES + out_size), in, (uint8_t)in_size);
 }
 
 /* After a reset of the processor alone the EEPROM may still be writing, and does not answer before it is
@@ -67,7 +66,9 @@ bool hal_nvm_read(hal_nvm_t *self, uint16_t address, uint8_t *bytes, uint16_t si
     }
     while (size != 0) {
         const uint16_t part = size < READ_MAX ? size : READ_MAX;
-        start(self, address, 0, bytes, part);
+        if (!start(self, address, 0, bytes, part)) {
+            return false;
+        }
         const i2c1_status_t status = wait_for_bus();
         if (may_be_writing(self, status)) {
             continue;
@@ -90,7 +91,9 @@ bool hal_nvm_write(hal_nvm_t *self, uint16_t address, const uint8_t *bytes, uint
         return false;
     }
     memcpy(&self->bytes[ADDRESS_BYTES], bytes, size);
-    start(self, address, size, NULL, 0);
+    if (!start(self, address, size, NULL, 0)) {
+        return false;
+    }
     self->status = HAL_NVM_BUSY;
     self->sent = false;
     return true;

@@ -25,7 +25,7 @@ typedef struct {
     hal_uart_t *uart;
     hal_nvm_t *nvm;
     uint32_t next_ms;
-    uint8_t host_count; /* bytes that the application has not taken yet */
+    uint16_t host_count; /* bytes that the application has not taken yet */
     uint8_t host_bytes[HOST_BYTES];
     arb_app_t app;
 } firmware_t;
@@ -86,12 +86,11 @@ static void take_frames(firmware_t *self, uint32_t now_ms)
 
 static void take_bytes(firmware_t *self, uint32_t now_ms)
 {
-    self->host_count =
-        (uint8_t)(self->host_count + hal_uart_read(self->uart, &self->host_bytes[self->host_count],
-                                                   (size_t)(HOST_BYTES - self->host_count)));
+    uint8_t *free = &self->host_bytes[self->host_count];
+    self->host_count += (uint16_t)hal_uart_read(self->uart, free, HOST_BYTES - self->host_count);
     if (self->host_count != 0) {
         const uint16_t taken = arb_app_on_bytes(&self->app, now_ms, self->host_bytes, self->host_count);
-        self->host_count = (uint8_t)(self->host_count - taken);
+        self->host_count -= taken;
         memmove(self->host_bytes, &self->host_bytes[taken], self->host_count);
     }
 }

@@ -41,26 +41,25 @@ bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry
     return true;
 }
 
-/* Puts identity and id in front; whoever was remembered with this id is forgotten. True: the table has
- * changed in more than its order. Order alone is not worth a write to non-volatile memory. */
-static bool remember(pdcp_bind_t *bind, const pdcp_identity_t *identity, uint8_t id)
+/* Puts identity and id in front; whoever was remembered with this id is forgotten. */
+static void remember(pdcp_bind_t *bind, const pdcp_identity_t *identity, uint8_t id)
 {
-    const bool changed = remembered_id(bind, identity) != id;
-    uint8_t kept = 0;
-    for (uint8_t i = 0; i < bind->remembered_count; i++) {
-        const pdcp_remembered_t *entry = &bind->remembered[i];
+    pdcp_remembered_t *const first = bind->remembered;
+    const pdcp_remembered_t *const end = &first[bind->remembered_count];
+    pdcp_remembered_t *kept = first;
+    for (const pdcp_remembered_t *entry = first; entry != end; entry++) {
         if (entry->node_id != id && !pdcp_identity_equal(&entry->identity, identity)) {
-            bind->remembered[kept++] = *entry;
+            *kept++ = *entry;
         }
     }
-    if (kept == PDCP_IDENTITIES_MAX) {
-        kept--;
+    uint8_t count = (uint8_t)(kept - first);
+    if (count == PDCP_IDENTITIES_MAX) {
+        count--;
     }
-    memmove(&bind->remembered[1], &bind->remembered[0], kept * sizeof bind->remembered[0]);
-    bind->remembered[0].identity = *identity;
-    bind->remembered[0].node_id = id;
-    bind->remembered_count = (uint8_t)(kept + 1u);
-    return changed;
+    memmove(&first[1], first, count * sizeof *first);
+    first->identity = *identity;
+    first->node_id = id;
+    bind->remembered_count = (uint8_t)(count + 1u);
 }
 
 /* Gives back the id that is reserved for an identity, 0: none. */
@@ -77,19 +76,19 @@ static uint8_t release_reserved(pdcp_bind_t *bind, const pdcp_identity_t *identi
     return 0;
 }
 
-/* Reserves the id, in a free entry or the one that ends first. The identity has none. */
+/* Reserves the id. The latest reservation stands first, so that the one that ends first falls out if no entry
+ * is free. The identity has none. */
 static void reserve(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t id)
 {
-    pdcp_reserved_t *best = &bus->bind.reserved[0];
-    for (uint8_t i = 1; i < PDCP_RESERVED_MAX && best->node_id != 0; i++) {
-        pdcp_reserved_t *entry = &bus->bind.reserved[i];
-        if (entry->node_id == 0 || pdcp_time_before(entry->until_ms, best->until_ms)) {
-            best = entry;
-        }
+    pdcp_reserved_t *const first = bus->bind.reserved;
+    uint8_t count = 0;
+    while (count < PDCP_RESERVED_MAX - 1 && first[count].node_id != 0) {
+        count++;
     }
-    best->identity = *identity;
-    best->node_id = id;
-    best->until_ms = bus->now_ms + PDCP_BIND_TIMEOUT_MS;
+    memmove(&first[1], first, count * sizeof *first);
+    first->identity = *identity;
+    first->node_id = id;
+    first->until_ms = bus->now_ms + PDCP_BIND_TIMEOUT_MS;
 }
 
 void pdcp_bind_on_time(pdcp_bus_t *bus)
@@ -116,19 +115,17 @@ static bool is_free(const pdcp_bus_t *bus, uint8_t id)
     return true;
 }
 
-/* The lowest free id that nobody is remembered with; while there is none, that of the identity that was away
- * longest. */
-static uint8_t pick_id(const pdcp_bus_t *bus)
+/* The first free id from this one on that nobody is remembered with; while there is none, that of the
+ * identity that was away longest. step: 1 or -1. 0: none is left. */
+static uint8_t pick_id(const pdcp_bus_t *bus, uint8_t id, int8_t step)
 {
-    const pdcp_bind_t *bind = &bus->bind;
-    for (uint16_t i = PDCP_NODE_MIN; i <= (uint16_t)PDCP_NODE_MAX; i++) {
-        const uint8_t id = (uint8_t)i;
-        if (is_free(bus, id) && !is_remembered(bind, id)) {
+    for (; is_node_id(id); id = (uint8_t)(id + step)) {
+        if (is_free(bus, id) && !is_remembered(&bus->bind, id)) {
             return id;
         }
     }
-    for (uint8_t i = bind->remembered_count; i-- > 0;) {
-        const uint8_t id = bind->remembered[i].node_id;
+    for (uint8_t i = bus->bind.remembered_count; i-- > 0;) {
+        id = bus->bind.remembered[i].node_id;
         if (is_free(bus, id)) {
             return id;
         }
@@ -137,10 +134,10 @@ static uint8_t pick_id(const pdcp_bus_t *bus)
 }
 
 /* The id that this identity is to have: its old one, the one it asks for, the one reserved for it, which is
- * free meanwhile, or any (D-BUS-6). */
-static uint8_t choose_id(const pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
-                         uint8_t reserved)
+ * given back first, or any (D-BUS-6). */
+static uint8_t choose_id(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked)
 {
+    const uint8_t reserved = release_reserved(&bus->bind, identity);
     const uint8_t old = remembered_id(&bus->bind, identity);
     if (is_free(bus, old)) {
         return old;
@@ -148,14 +145,15 @@ static uint8_t choose_id(const pdcp_bus_t *bus, const pdcp_identity_t *identity,
     if (is_free(bus, asked) && !is_remembered(&bus->bind, asked)) {
         return asked;
     }
-    return is_free(bus, reserved) ? reserved : pick_id(bus);
+    return is_free(bus, reserved) ? reserved : pick_id(bus, PDCP_NODE_MIN, 1);
 }
 
 /* [PDCP 3.2.1]: the answer goes to the id that was asked for. */
 static void answer(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked, uint8_t id,
                    pdcp_stat_t stat)
 {
-    const pdcp_msg_t msg = {.code = PDCP_BIND_DEVICE | PDCP_ANSWER, .node_id = id, .identity = *identity};
+    pdcp_msg_t msg = {.code = PDCP_BIND_DEVICE | PDCP_ANSWER, .node_id = id};
+    msg.identity = *identity;
     pdcp_bus_count(bus, stat);
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, asked, &msg);
 }
@@ -163,13 +161,16 @@ static void answer(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t ask
 /* The device is to have this id: it is granted if it asked for it, else suggested. */
 static pdcp_bind_result_t offer(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked, uint8_t id)
 {
+    (void)release_reserved(&bus->bind, identity);
     if (id != asked) {
         reserve(bus, identity, id);
         answer(bus, identity, asked, id, PDCP_STAT_BIND_SUGGESTED);
         return PDCP_BIND_SUGGESTED;
     }
     answer(bus, identity, asked, id, PDCP_STAT_BIND_GRANTED);
-    if (remember(&bus->bind, identity, id)) {
+    const uint8_t old = remembered_id(&bus->bind, identity);
+    remember(&bus->bind, identity, id);
+    if (old != id) { /* order alone is not worth a write to non-volatile memory */
         pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
     }
     return PDCP_BIND_GRANTED;
@@ -178,7 +179,6 @@ static pdcp_bind_result_t offer(pdcp_bus_t *bus, const pdcp_identity_t *identity
 pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
                                         uint8_t *node)
 {
-    const uint8_t reserved = release_reserved(&bus->bind, identity);
     *node = pdcp_nodes_find(&bus->nodes, identity);
     if (*node != PDCP_NONE) {
         pdcp_node_t *known = &bus->nodes.nodes[*node];
@@ -189,9 +189,10 @@ pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *
         known->asked_id = asked;
         return PDCP_BIND_CHECK;
     }
-    const uint8_t id = choose_id(bus, identity, asked, reserved);
+    /* Without a place nothing is given back. With one, an id that is reserved is there to be had. */
     const uint8_t place = pdcp_nodes_free_place(&bus->nodes);
-    if (id == 0 || place == PDCP_NONE) {
+    const uint8_t id = place != PDCP_NONE ? choose_id(bus, identity, asked) : 0;
+    if (id == 0) {
         answer(bus, identity, asked, PDCP_NODE_REFUSED, PDCP_STAT_BIND_REFUSED);
         pdcp_bus_tell_node(bus, PDCP_EVENT_REFUSED, PDCP_NONE);
         return PDCP_BIND_REFUSED;
@@ -217,14 +218,5 @@ pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t node, bool ans
 
 uint8_t pdcp_bind_output_id(const pdcp_bus_t *bus)
 {
-    uint8_t remembered = 0;
-    for (uint8_t id = PDCP_NODE_MAX; id >= PDCP_NODE_MIN; id--) {
-        if (is_free(bus, id)) {
-            if (!is_remembered(&bus->bind, id)) {
-                return id;
-            }
-            remembered = id;
-        }
-    }
-    return remembered;
+    return pick_id(bus, PDCP_NODE_MAX, -1);
 }

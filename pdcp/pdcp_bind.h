@@ -58,8 +58,9 @@ pdcp_bind_result_t pdcp_bind_on_request(struct pdcp_bus *bus, const pdcp_identit
  * pdcp_bind_on_request left open. */
 pdcp_bind_result_t pdcp_bind_after_check(struct pdcp_bus *bus, uint8_t node, bool answered);
 
-/* A node id for an output channel: free, not reserved, and while there is one, not remembered for a device.
- * Highest first, since devices tend to ask for low ones. 0: none is left. */
+/* A node id for an output channel: free, not reserved, and while there is one, not remembered for a device,
+ * else that of the device that was away longest. Highest first, since devices tend to ask for low ones. 0:
+ * none is left. */
 uint8_t pdcp_bind_output_id(const struct pdcp_bus *bus);
 
 #endif

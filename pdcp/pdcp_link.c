@@ -528,8 +528,7 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     switch ((step_t)bus->link.step) {
     case STEP_READ_VID_PID:
     case STEP_READ_SERIAL:
-        pdcp_nodes_take_source(input, reply->param, pdcp_value_u16(reply->bytes, reply->len, 0),
-                               pdcp_value_u16(reply->bytes, reply->len, 2));
+        pdcp_nodes_take_source(input, reply);
         break;
     case STEP_INPUT_OFF:
         input->enabled = false;

@@ -2,6 +2,8 @@
 
 #include <string.h>
 
+#include "pdcp_codec.h"
+
 /* Makes a place free. */
 static void clear_place(pdcp_node_t *node, uint8_t place)
 {
@@ -48,8 +50,6 @@ void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *i
     node->state = PDCP_NODE_SETUP;
     node->identity = *identity;
     node->node_id = node_id;
-    node->beacon_ms = PDCP_BEACON_MS;
-    node->ack_ms = PDCP_ACK_MS;
     nodes->owner[node_id] = (uint8_t)(place + 1);
 }
 
@@ -71,9 +71,8 @@ static void drop_needs(pdcp_nodes_t *nodes, pdcp_node_t *gone)
     gone->needs_at = 0;
 }
 
-void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, uint8_t channel, uint8_t node_id)
+void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id)
 {
-    pdcp_channel_t *output = &nodes->channels[channel];
     if (output->node_id != 0) {
         nodes->owner[output->node_id] = 0;
     }
@@ -92,14 +91,6 @@ void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel)
     }
 }
 
-static void free_channel(pdcp_nodes_t *nodes, uint8_t channel)
-{
-    pdcp_nodes_set_output_id(nodes, channel, 0);
-    memset(&nodes->channels[channel], 0, sizeof nodes->channels[channel]);
-    nodes->channels[channel].node = PDCP_NONE;
-    pdcp_nodes_drop_feed(nodes, channel);
-}
-
 /* Frees the channels of a device from the one with index count + 1 on. */
 static void cut_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t count)
 {
@@ -111,7 +102,10 @@ static void cut_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t count)
             link = &channel->next;
         } else {
             *link = channel->next;
-            free_channel(nodes, number);
+            pdcp_nodes_set_output_id(nodes, channel, 0);
+            memset(channel, 0, sizeof *channel);
+            channel->node = PDCP_NONE;
+            pdcp_nodes_drop_feed(nodes, number);
         }
     }
 }
@@ -135,12 +129,14 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
     input->source_profile = 0;
 }
 
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
+void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
 {
-    if (param == PDCP_IN_SOURCE_VID_PID) {
+    const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
+    const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
+    if (reply->param == PDCP_IN_SOURCE_VID_PID) {
         input->source.vid = low;
         input->source.pid = high;
-    } else if (param == PDCP_IN_SOURCE_SERIAL) {
+    } else if (reply->param == PDCP_IN_SOURCE_SERIAL) {
         input->source.sn = low;
         input->source_index = (uint8_t)(high & 0xFFu);
     } else {
@@ -149,10 +145,9 @@ void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, 
     }
 }
 
-/* Makes a free entry of the pool a channel that nothing is known of. */
+/* Makes a free entry of the pool, which is all 0 but for its node, a channel that nothing is known of. */
 static void make_channel(pdcp_channel_t *channel, uint8_t node, uint16_t index)
 {
-    memset(channel, 0, sizeof *channel);
     channel->node = node;
     channel->index = (uint8_t)index;
     channel->next = PDCP_NONE;
@@ -183,14 +178,13 @@ static bool append_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t cou
 bool pdcp_nodes_set_channels(pdcp_nodes_t *nodes, uint8_t node, uint8_t count)
 {
     pdcp_node_t *owner = &nodes->nodes[node];
-    if (!append_channels(nodes, owner, count)) {
-        cut_channels(nodes, owner, owner->channel_count);
-        return false;
+    const bool fits = append_channels(nodes, owner, count);
+    if (fits) {
+        drop_needs(nodes, owner);
+        owner->channel_count = count;
     }
-    drop_needs(nodes, owner);
-    cut_channels(nodes, owner, count);
-    owner->channel_count = count;
-    return true;
+    cut_channels(nodes, owner, owner->channel_count);
+    return fits;
 }
 
 uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t index)
@@ -207,7 +201,9 @@ bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node)
     pdcp_node_t *owner = &nodes->nodes[node];
     uint16_t inputs = 0;
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-        inputs = (uint16_t)(inputs + (nodes->channels[c].transfer == PDCP_INPUT ? 1u : 0u));
+        if (nodes->channels[c].transfer == PDCP_INPUT) {
+            inputs++;
+        }
     }
     drop_needs(nodes, owner);
     const uint16_t stride = (uint16_t)((inputs + 7u) / 8u);
@@ -234,18 +230,17 @@ static uint8_t mask_of(uint16_t bit)
     return (uint8_t)(0x80u >> (bit % 8u));
 }
 
-void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
-                          const uint8_t *bytes, uint16_t len)
+void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, const pdcp_reply_t *reply)
 {
     const pdcp_channel_t *needing = &nodes->channels[channel];
     const pdcp_node_t *owner = &nodes->nodes[needing->node];
-    uint8_t *set = &nodes->needs[set_at(owner, needing, desired)];
+    uint8_t *set = &nodes->needs[set_at(owner, needing, reply->param == PDCP_CH_DESIRED)];
     uint16_t bit = 0; /* of an input in a set of its device */
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
         const pdcp_channel_t *input = &nodes->channels[c];
         if (input->transfer == PDCP_INPUT) {
-            const uint16_t from = (uint16_t)(input->index - 8u * offset); /* large before the offset */
-            if (from / 8u < len && (bytes[from / 8u] & mask_of(from)) != 0) {
+            const uint16_t from = (uint16_t)(input->index - 8u * reply->offset); /* large before the offset */
+            if (from / 8u < reply->len && (reply->bytes[from / 8u] & mask_of(from)) != 0) {
                 set[bit / 8u] |= mask_of(bit);
             }
             bit++;
@@ -263,7 +258,7 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
         const pdcp_channel_t *input = &nodes->channels[c];
         if (input->transfer == PDCP_INPUT) {
             if (input->index == index) {
-                return owner->needs_stride != 0 && (set[bit / 8u] & mask_of(bit)) != 0;
+                return (set[bit / 8u] & mask_of(bit)) != 0;
             }
             bit++;
         }
@@ -271,38 +266,39 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
     return false;
 }
 
-/* Walks over the places in their order and each device's channels: returns the number-th that counts and, in
- * *count, how many there were up to it. */
-static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number, uint8_t *count)
+/* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE:
+ * there are fewer. number 0: how many there are. */
+static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
 {
-    *count = 0;
+    uint8_t count = 0;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         const pdcp_node_t *node = &nodes->nodes[i];
-        if (kind == PDCP_COUNTS_DEVICE && pdcp_nodes_device_counts(node) && ++*count == number) {
+        if (kind != PDCP_COUNTS_LINK && !node->beaconed) {
+            continue;
+        }
+        if (kind == PDCP_COUNTS_DEVICE && node->state != PDCP_NODE_LOST && ++count == number) {
             return i;
         }
-        const bool counts = node->beaconed && node->state == PDCP_NODE_READY;
+        if (kind != PDCP_COUNTS_LINK && node->state != PDCP_NODE_READY) {
+            continue;
+        }
         for (uint8_t c = node->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
             const pdcp_channel_t *channel = &nodes->channels[c];
-            const bool is_one = kind == PDCP_COUNTS_LINK ? channel->link != PDCP_LINK_NONE
-                                                         : counts && channel->transfer == kind;
-            if (is_one && ++*count == number) {
+            const uint8_t is_one = kind == PDCP_COUNTS_LINK ? channel->link : channel->transfer == kind;
+            if (is_one != 0 && ++count == number) {
                 return c;
             }
         }
     }
-    return PDCP_NONE;
+    return number == 0 ? count : PDCP_NONE;
 }
 
 uint8_t pdcp_nodes_nth(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
 {
-    uint8_t count;
-    return walk(nodes, kind, number, &count);
+    return number == 0 ? PDCP_NONE : walk(nodes, kind, number);
 }
 
 uint8_t pdcp_nodes_count(const pdcp_nodes_t *nodes, uint8_t kind)
 {
-    uint8_t count;
-    (void)walk(nodes, kind, 0, &count);
-    return count;
+    return walk(nodes, kind, 0);
 }

@@ -121,28 +121,27 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
 /* Makes the source of an input that of an unconnected one (D-BUS-7). */
 void pdcp_nodes_clear_source(pdcp_channel_t *input);
 
-/* Takes over a parameter that names the source of an input, 5, 6 or 8: the first and the second of its words.
- */
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
+/* Takes over a parameter that names the source of an input, 5, 6 or 8. */
+void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply);
 
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */
 bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
 
-/* Stores bytes of a bit string of required (desired = false) or desired channels: bit 7 of byte 0 is channel
- * index 0 (D-BUS-8). offset: of bytes[0] in the string, below PDCP_PARAMETER_MAX. Bits of channels that are
- * no inputs of the device are dropped (D-BUS-13). */
-void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
-                          const uint8_t *bytes, uint16_t len);
+/* Stores what has come of a bit string of required or desired channels, parameter 9 or 10: bit 7 of byte 0 is
+ * channel index 0 (D-BUS-8). Offsets are below PDCP_PARAMETER_MAX. Bits of channels that are no inputs of the
+ * device are dropped (D-BUS-13). */
+void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, const pdcp_reply_t *reply);
 
-/* Does channel need (or desire) the input with this index of its own device? */
+/* Does channel need (or desire) the input with this index of its own device, which must have room for needs?
+ */
 bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index);
 
 /* No input is fed by this channel any more: it is gone, or no output now. */
 void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
 
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
-void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, uint8_t channel, uint8_t node_id);
+void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id);
 
 /* Is the node id the device's own (true), or that of one of its outputs (false)? node: place of the owner,
  * PDCP_NONE: nobody has this id. */
@@ -153,13 +152,8 @@ static inline bool pdcp_nodes_owner(const pdcp_nodes_t *nodes, uint8_t node_id, 
     return (owner & 0x80u) == 0;
 }
 
-/* A device counts from its first beacon, its channels when it is set up (D-API-6). */
-static inline bool pdcp_nodes_device_counts(const pdcp_node_t *node)
-{
-    return node->beaconed && node->state != PDCP_NODE_FREE && node->state != PDCP_NODE_LOST;
-}
-
-/* What counts for the host. A link is named by its input's channel number. */
+/* What counts for the host: a device from its first beacon until it is lost, its channels when it is set up
+ * (D-API-6). A link is named by its input's channel number. */
 enum {
     PDCP_COUNTS_LINK = 0,
     PDCP_COUNTS_INPUT = PDCP_INPUT,

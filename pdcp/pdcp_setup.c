@@ -87,11 +87,11 @@ static void no_room(pdcp_bus_t *bus, pdcp_node_t *device)
 /* Writes of the setup: transfer enabled 0, and the node id of an output. */
 static void write_step(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param)
 {
-    const pdcp_channel_t *channel = current_channel(bus, device);
+    pdcp_channel_t *channel = current_channel(bus, device);
     uint8_t value = 0;
     if (param == PDCP_OUT_NODE_ID) {
         if (channel->node_id == 0) {
-            pdcp_nodes_set_output_id(&bus->nodes, device->setup_channel, pdcp_bind_output_id(bus));
+            pdcp_nodes_set_output_id(&bus->nodes, channel, pdcp_bind_output_id(bus));
         }
         value = channel->node_id;
         if (value == 0) {
@@ -179,23 +179,30 @@ static bool take_device(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param, uin
 {
     switch (param) {
     case PDCP_DEV_VID_PID:
-        return low == device->identity.vid && high == device->identity.pid;
+        if (low != device->identity.vid || high != device->identity.pid) {
+            return false;
+        }
+        break;
     case PDCP_DEV_SERIAL:
-        return low == device->identity.sn;
+        if (low != device->identity.sn) {
+            return false;
+        }
+        break;
     case PDCP_DEV_TYPE_PROFILE:
         device->type = low;
         device->profile = high;
-        return true;
+        break;
     case PDCP_DEV_CHANNELS:
         if (!pdcp_nodes_set_channels(&bus->nodes, device->place, (uint8_t)(low & 0xFFu))) {
             pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
             return false;
         }
-        return true;
+        break;
     default:
         pdcp_setup_take_time(device, param, low);
-        return true;
+        break;
     }
+    return true;
 }
 
 /* Takes over the direction of a channel, and forgets what was known of it if that has changed. */
@@ -206,7 +213,7 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
         return false;
     }
     if (channel->transfer != 0 && channel->transfer != transfer) {
-        pdcp_nodes_set_output_id(&bus->nodes, number, 0);
+        pdcp_nodes_set_output_id(&bus->nodes, channel, 0);
         pdcp_nodes_drop_feed(&bus->nodes, number);
         channel->link = PDCP_LINK_NONE;
         channel->todo = PDCP_TODO_NONE;
@@ -236,7 +243,7 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
         break;
     default: /* its own idea of its source counts only while the arbitrator knows of no link */
         if (reply->code == PDCP_GET_PARAMETER && channel->link == PDCP_LINK_NONE) {
-            pdcp_nodes_take_source(channel, reply->param, low, high);
+            pdcp_nodes_take_source(channel, reply);
         }
         break;
     }
@@ -246,10 +253,9 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
 /* Takes over a value or a piece of one. Bit strings may have many, numbers stand in the first one. */
 static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply)
 {
-    const bool is_device = device->setup_pass == PASS_DEVICE;
-    if (!is_device && (reply->param == PDCP_CH_REQUIRED || reply->param == PDCP_CH_DESIRED)) {
-        pdcp_nodes_put_needs(&bus->nodes, device->setup_channel, reply->param == PDCP_CH_DESIRED,
-                             reply->offset, reply->bytes, reply->len);
+    if (device->setup_pass != PASS_DEVICE &&
+        (reply->param == PDCP_CH_REQUIRED || reply->param == PDCP_CH_DESIRED)) {
+        pdcp_nodes_put_needs(&bus->nodes, device->setup_channel, reply);
         return true;
     }
     if (reply->offset != 0) {
@@ -257,22 +263,27 @@ static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply
     }
     const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
     const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
-    return is_device ? take_device(bus, device, reply->param, low, high)
-                     : take_channel(bus, device->setup_channel, reply, low, high);
+    return device->setup_pass == PASS_DEVICE ? take_device(bus, device, reply->param, low, high)
+                                             : take_channel(bus, device->setup_channel, reply, low, high);
 }
 
 pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
 {
     pdcp_node_t *device = pdcp_bus_node(bus, node);
-    const bool has_value = reply->status == PDCP_OK; /* or a piece of one */
-    const bool mandatory = (current_step(bus, device) & MANDATORY) != 0;
-    if (has_value ? !take(bus, device, reply) : mandatory || reply->status == PDCP_ERR_NO_ANSWER) {
+    bool done_well = false;
+    if (reply->status == PDCP_OK) { /* a value, or a piece of one */
+        done_well = take(bus, device, reply);
+    } else if (reply->status != PDCP_ERR_NO_ANSWER) {
+        done_well = (current_step(bus, device) & MANDATORY) == 0;
+    }
+    if (!done_well) {
         pdcp_request_cancel(bus, node);
         fail(bus, device);
-        const bool names_device = device->setup_pass == PASS_DEVICE && reply->param <= PDCP_DEV_SERIAL;
-        return has_value && names_device ? PDCP_ERR_UNKNOWN : PDCP_OK;
-    }
-    if (reply->done) {
+        if (reply->status == PDCP_OK && device->setup_pass == PASS_DEVICE &&
+            reply->param <= PDCP_DEV_SERIAL) {
+            return PDCP_ERR_UNKNOWN;
+        }
+    } else if (reply->done) {
         go_on(bus, device);
     }
     return PDCP_OK;

@@ -26,7 +26,7 @@ enum {
 
 static volatile uint32_t clock_ms;
 
-static bool switch_oscillator(void)
+static void switch_oscillator(void)
 {
     uint16_t rounds = WAIT_ROUNDS;
     CLKDIV = 0; /* N1 = N2 = 2, no doze */
@@ -35,12 +35,12 @@ static bool switch_oscillator(void)
     __builtin_write_OSCCONL((uint8_t)(OSCCON | 1u)); /* OSWEN */
     while ((OSCCONbits.OSWEN || !OSCCONbits.LOCK) && --rounds != 0) {
     }
-    return OSCCONbits.COSC == COSC_PRIMARY_PLL && OSCCONbits.LOCK;
 }
 
 bool clock_start(void)
 {
-    if (!switch_oscillator()) {
+    switch_oscillator();
+    if (OSCCONbits.COSC != COSC_PRIMARY_PLL || !OSCCONbits.LOCK) {
         return false;
     }
     T1CON = 0;

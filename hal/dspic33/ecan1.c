@@ -102,16 +102,14 @@ static struct hal_can ecan1;
 
 /* --- set-up --- */
 
-static bool enter_configuration(void)
+/* The rounds that were left of its wait; 0: the mode was not entered. */
+static uint16_t enter_configuration(void)
 {
     uint16_t rounds = MODE_WAIT_ROUNDS;
     C1CTRL1bits.REQOP = MODE_CONFIGURATION;
-    while (C1CTRL1bits.OPMODE != MODE_CONFIGURATION) {
-        if (--rounds == 0) {
-            return false;
-        }
+    while (C1CTRL1bits.OPMODE != MODE_CONFIGURATION && --rounds != 0) {
     }
-    return true;
+    return rounds;
 }
 
 /* Peripheral indirect: the controller says which buffer, the buffers' common address has zeros in those bits.
@@ -186,7 +184,7 @@ hal_can_t *ecan1_open(void)
 {
     IEC2bits.C1IE = 0;
     memset(&ecan1, 0, sizeof ecan1);
-    if (!enter_configuration()) {
+    if (enter_configuration() == 0) {
         ecan1.health.state = HAL_CAN_DOWN;
         return &ecan1;
     }
@@ -347,7 +345,7 @@ size_t hal_can_receive(hal_can_t *can, can_frame_t *frames, size_t max)
     ring_t *ring = &can->rx_ring;
     size_t count = 0;
     for (; count < max && ring_count(ring) != 0; count++) {
-        decode(&can->rx_frames[ring_place(ring->tail, RX_PLACES)], &frames[count]);
+        decode(&can->rx_frames[ring_place(ring->tail, RX_PLACES)], frames++);
         ring->tail++;
     }
     if (fifo_holds_frames()) {
@@ -355,7 +353,7 @@ size_t hal_can_receive(hal_can_t *can, can_frame_t *frames, size_t max)
     }
     for (; count < max && can->errors_told != can->errors_seen; count++) {
         can->errors_told++;
-        frames[count] = (can_frame_t){.kind = CAN_FRAME_ERROR};
+        *frames++ = (can_frame_t){.kind = CAN_FRAME_ERROR};
     }
     return count;
 }

@@ -123,7 +123,7 @@ i2c1_status_t i2c1_status(void)
 
 /* --- the handler's steps; each returns what it asked the module for --- */
 
-static i2c1_state_t stop(i2c1_status_t result)
+PART_INLINE i2c1_state_t stop(i2c1_status_t result)
 {
     i2c1.result = result;
     I2C1CONbits.PEN = 1;

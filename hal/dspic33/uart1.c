@@ -10,7 +10,7 @@ enum { PLACES = 128, STA_OERR = 0x0002, STA_FERR = 0x0004, STA_URXDA = 0x0001 };
 struct hal_uart {
     ring_t rx_ring;
     ring_t tx_ring;
-    bool refused; /* the last write was not taken whole */
+    size_t refused; /* bytes of the last write that were not taken */
     volatile uint16_t lost;
     uint8_t rx_bytes[PLACES];
     uint8_t tx_bytes[PLACES];
@@ -52,7 +52,7 @@ size_t hal_uart_write(hal_uart_t *uart, const uint8_t *bytes, size_t size)
         uart->tx_bytes[ring_place(uart->tx_ring.head, PLACES)] = bytes[count++];
         uart->tx_ring.head++;
     }
-    uart->refused = count < size;
+    uart->refused = size - count;
     if (count != 0) {
         IEC0bits.U1TXIE = 1;
     }
@@ -61,7 +61,7 @@ size_t hal_uart_write(hal_uart_t *uart, const uint8_t *bytes, size_t size)
 
 bool uart1_has_work(const hal_uart_t *uart)
 {
-    return ring_count(&uart->rx_ring) != 0 || (uart->refused && ring_count(&uart->tx_ring) < PLACES);
+    return ring_count(&uart->rx_ring) != 0 || (uart->refused != 0 && ring_count(&uart->tx_ring) < PLACES);
 }
 
 uint16_t uart1_lost(const hal_uart_t *uart)

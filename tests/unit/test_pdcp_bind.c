@@ -164,6 +164,24 @@ static void test_a_full_bus_refuses_with_id_0(void)
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_REFUSED));
 }
 
+/* D-BUS-6: a suggested id stays reserved for its device, also when that is refused meanwhile. */
+static void test_a_refused_device_keeps_its_reservation(void)
+{
+    exchange_rx(&x, "600#01 0900 0900 0900");
+    exchange_tx(&x, "300#81 01 0900 0900 0900");
+    for (unsigned i = 0; i < PDCP_DEVICES_MAX; i++) {
+        char request[40];
+        (void)snprintf(request, sizeof request, "6%02X#01 0100 0100 %02X00", i + 2, i + 1);
+        exchange_rx(&x, request);
+        (void)exchange_drain(&x);
+    }
+    exchange_rx(&x, "6C0#01 0900 0900 0900");
+    exchange_tx(&x, "3C0#81 00 0900 0900 0900");
+    pdcp_nodes_remove(&x.arb->bus.nodes, 31); /* it had 0x21 */
+    exchange_rx(&x, "601#01 0200 0200 0200");
+    exchange_tx(&x, "301#81 22 0200 0200 0200");
+}
+
 static void test_without_a_node_id_it_is_refused(void)
 {
     memset(&x.arb->bus.nodes.owner[1], 0x80 | 40, 254);
@@ -256,6 +274,7 @@ int main(void)
     RUN_TEST(test_stored_identities_that_cannot_be_are_left_out);
     RUN_TEST(test_the_oldest_identity_is_forgotten_first);
     RUN_TEST(test_a_full_bus_refuses_with_id_0);
+    RUN_TEST(test_a_refused_device_keeps_its_reservation);
     RUN_TEST(test_without_a_node_id_it_is_refused);
     RUN_TEST(test_a_second_device_with_the_same_identity_is_refused);
     RUN_TEST(test_a_device_that_was_reset_is_granted_again);

@@ -60,13 +60,13 @@ static bool read_string(const arb_nvm_t *nvm, uint8_t area, uint16_t at, uint8_t
 }
 
 /* Begins to read the string of an area. */
-static void open_string(arb_config_t *config, uint8_t area, uint16_t length, const profile_tlv_sink_t *sink)
+static void open_string(arb_config_t *config, uint8_t area, uint16_t length, profile_tlv_on_link_t on_link)
 {
     config->from = area;
     config->at = 0;
     config->until = length;
     config->crc_read = ARB_CRC32_INIT;
-    profile_tlv_init(&config->reader, sink, config->ctx);
+    profile_tlv_init(&config->reader, on_link, config->ctx);
 }
 
 /* Reads on, up to CONFIG_CHUNK bytes. False: the memory has failed. */
@@ -161,14 +161,14 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
     config->done(config->ctx, status);
 }
 
-arb_config_status_t arb_config_read(arb_config_t *config, const profile_tlv_sink_t *sink,
+arb_config_status_t arb_config_read(arb_config_t *config, profile_tlv_on_link_t on_link,
                                     arb_config_done_t done, void *ctx, uint32_t now_ms)
 {
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
     }
     start(config, PHASE_READ, done, ctx, now_ms);
-    open_string(config, config->newest.area, config->length, sink);
+    open_string(config, config->newest.area, config->length, on_link);
     return ARB_CONFIG_OK;
 }
 

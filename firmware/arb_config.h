@@ -127,10 +127,10 @@ static inline bool arb_config_has(const arb_config_t *config, uint8_t number)
     return profile_tlv_has(config->numbers, number);
 }
 
-/* Hands all stored configurations to sink, in the order in which they stand. After any end but ARB_CONFIG_OK
- * (ERR_STORAGE: the memory has failed or the copy is damaged) what was handed over must not be used. sink,
- * which gets ctx too, must last until done. */
-arb_config_status_t arb_config_read(arb_config_t *config, const profile_tlv_sink_t *sink,
+/* Hands the links of all stored configurations to on_link, which gets ctx too, in the order in which they
+ * stand. After any end but ARB_CONFIG_OK (ERR_STORAGE: the memory has failed or the copy is damaged) what was
+ * handed over must not be used. */
+arb_config_status_t arb_config_read(arb_config_t *config, profile_tlv_on_link_t on_link,
                                     arb_config_done_t done, void *ctx, uint32_t now_ms);
 
 /* Stores count links as configuration *number; 0 takes the lowest free number and puts it there. A

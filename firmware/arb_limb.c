@@ -184,8 +184,7 @@ static void on_link(void *ctx, uint8_t number, const profile_link_t *link)
 
 static uint8_t read_all(arb_limb_t *limb, stage_t stage, uint32_t now_ms)
 {
-    static const profile_tlv_sink_t sink = {.on_link = on_link};
-    return started(limb, stage, arb_config_read(&limb->config, &sink, on_done, limb, now_ms));
+    return started(limb, stage, arb_config_read(&limb->config, on_link, on_done, limb, now_ms));
 }
 
 /* --- Start-up: which stored configuration (D-PRO-4) --- */

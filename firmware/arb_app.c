@@ -27,7 +27,6 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
     memset(app, 0, sizeof *app);
     app->work = true;
     pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
-    arb_hostapi_init(&app->api);
     arb_nvm_init(&app->nvm, port);
     arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
     arb_limb_init(&app->limb, &app->arb.bus.nodes, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
@@ -90,11 +89,6 @@ static void send_frames(arb_app_t *app, uint32_t now_ms)
     }
 }
 
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
-}
-
 uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
 {
     if (!app->work && pdcp_time_before(now_ms, app->next_ms)) {
@@ -116,9 +110,9 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
     }
     send_frames(app, now_ms);
     arb_store_step(&app->store, &app->arb.bus.bind, now_ms);
-    next_ms = earlier(next_ms, arb_limb_next_ms(&app->limb, &app->arb, now_ms));
-    next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
-    app->next_ms = earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_limb_next_ms(&app->limb, &app->arb, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
+    app->next_ms = pdcp_time_earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
     app->work = pdcp_arb_tx_peek(&app->arb) != NULL || arb_hostapi_has_output(&app->api);
     return app->next_ms;
 }

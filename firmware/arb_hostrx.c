@@ -4,11 +4,6 @@
 
 #include "pdcp_time.h"
 
-void arb_hostrx_init(arb_hostrx_t *rx)
-{
-    memset(rx, 0, sizeof *rx);
-}
-
 /* Bytes like FE 19, or FE as the last one, are where a message may begin. Returns the next such place from at
  * on; rx->len: there is none. */
 static uint16_t next_sync(const arb_hostrx_t *rx, uint16_t at)

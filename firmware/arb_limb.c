@@ -33,7 +33,6 @@ static void apply_flags(arb_limb_t *limb, uint8_t flags)
 void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
                    uint8_t flags_off, uint32_t now_ms)
 {
-    memset(limb, 0, sizeof *limb);
     limb->told = true;
     profile_run_init(&limb->run, nodes, now_ms);
     arb_flags_load(&limb->flags, nvm);
@@ -452,18 +451,13 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
     return handed;
 }
 
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
-}
-
 uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     uint32_t next_ms = profile_run_next_ms(&limb->run, arb, now_ms);
-    next_ms = earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
-    next_ms = earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
     if (may_auto_save(limb)) {
-        next_ms = earlier(next_ms, limb->save_ms);
+        next_ms = pdcp_time_earlier(next_ms, limb->save_ms);
     }
     return next_ms;
 }

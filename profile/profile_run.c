@@ -23,7 +23,6 @@ static void wait_for_start(profile_run_t *run, uint32_t now_ms)
 
 void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms)
 {
-    memset(run, 0, sizeof *run);
     run->scene.nodes = nodes;
     run->scene.links = &run->links;
     run->stirred_ms = now_ms;
@@ -541,11 +540,6 @@ static bool has_awaited(const profile_run_t *run)
     return all != 0;
 }
 
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
-}
-
 /* When a plan is due though nothing happens: a device is awaited no longer, or links are tried again. */
 static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
 {
@@ -554,7 +548,7 @@ static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
         next_ms = run->awaited_ms;
     }
     if (run->scene.banned_count != 0 && run->state != PROFILE_CONFIGURING) {
-        next_ms = earlier(next_ms, run->retry_ms);
+        next_ms = pdcp_time_earlier(next_ms, run->retry_ms);
     }
     return next_ms;
 }
@@ -604,7 +598,7 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);
     if (run->due != 0 && run->state != PROFILE_CONFIGURING && is_held_back(run, arb, now_ms)) {
-        return earlier(next_ms, run->arrival_ms);
+        return pdcp_time_earlier(next_ms, run->arrival_ms);
     }
     return next_ms;
 }

@@ -65,7 +65,7 @@ typedef struct {
     profile_links_t links; /* the active configuration */
 } profile_run_t;
 
-/* nodes: the arbitrator's tables; they must outlive run. */
+/* run is all zero before. nodes: the arbitrator's tables; they must outlive run. */
 void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms);
 
 /* An event of the arbitrator; hand all of them in. */

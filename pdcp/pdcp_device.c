@@ -507,7 +507,8 @@ uint32_t pdcp_device_step(pdcp_device_t *dev, uint32_t now_ms)
         dev->suspended = false;
     }
     const uint32_t next_ms = steps[dev->state](dev, now_ms);
-    return dev->suspended && !dev->suspended_for_good ? pdcp_time_earlier(next_ms, dev->suspend_deadline_ms) : next_ms;
+    return dev->suspended && !dev->suspended_for_good ? pdcp_time_earlier(next_ms, dev->suspend_deadline_ms)
+                                                      : next_ms;
 }
 
 /* --- the whole --- */

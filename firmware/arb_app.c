@@ -25,13 +25,11 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
 void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings, uint32_t now_ms)
 {
     memset(app, 0, sizeof *app);
-    app->port = port;
     app->work = true;
     pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
-    arb_hostapi_init(&app->api);
     arb_nvm_init(&app->nvm, port);
     arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
-    arb_limb_init(&app->limb, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
+    arb_limb_init(&app->limb, &app->arb.bus.nodes, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
                   settings->no_autoconfig ? ARB_FLAG_AUTOCONFIGURE : 0, now_ms);
     app->api.strict = (arb_limb_flags(&app->limb) & ARB_FLAG_STRICT_CRC) != 0;
     pdcp_arb_plan_links(&app->arb, false);
@@ -49,7 +47,7 @@ void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
         app->work = true;
     }
     if (arb_hostapi_wants_frames(&app->api)) {
-        arb_hostapi_on_frame(&app->api, app->port, now_ms, frame);
+        arb_hostapi_on_frame(&app->api, app->nvm.port, now_ms, frame);
         app->work = true;
     }
 }
@@ -82,18 +80,13 @@ uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes,
 static void send_frames(arb_app_t *app, uint32_t now_ms)
 {
     const can_frame_t *frame = pdcp_arb_tx_peek(&app->arb);
-    while (frame != NULL && app->port->can_send(app->port->ctx, frame)) {
+    while (frame != NULL && app->nvm.port->can_send(app->nvm.port->ctx, frame)) {
         if (arb_hostapi_wants_frames(&app->api)) {
-            arb_hostapi_on_frame(&app->api, app->port, now_ms, frame);
+            arb_hostapi_on_frame(&app->api, app->nvm.port, now_ms, frame);
         }
         pdcp_arb_tx_pop(&app->arb);
         frame = pdcp_arb_tx_peek(&app->arb);
     }
-}
-
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
 }
 
 uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
@@ -102,7 +95,7 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
         return app->next_ms;
     }
     const arb_hostenv_t env = {
-        .arb = &app->arb, .limb = &app->limb, .nvm = &app->nvm, .store = &app->store, .port = app->port};
+        .arb = &app->arb, .limb = &app->limb, .nvm = &app->nvm, .store = &app->store, .port = app->nvm.port};
     uint32_t next_ms;
     bool again;
     do {
@@ -112,14 +105,14 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
             again = true;
         }
     } while (again);
-    if (pdcp_arb_take_restart(&app->arb) && app->port->can_restart != NULL) {
-        app->port->can_restart(app->port->ctx);
+    if (pdcp_arb_take_restart(&app->arb) && app->nvm.port->can_restart != NULL) {
+        app->nvm.port->can_restart(app->nvm.port->ctx);
     }
     send_frames(app, now_ms);
     arb_store_step(&app->store, &app->arb.bus.bind, now_ms);
-    next_ms = earlier(next_ms, arb_limb_next_ms(&app->limb, &app->arb, now_ms));
-    next_ms = earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
-    app->next_ms = earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_limb_next_ms(&app->limb, &app->arb, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_hostapi_next_ms(&app->api, now_ms));
+    app->next_ms = pdcp_time_earlier(next_ms, arb_store_next_ms(&app->store, now_ms));
     app->work = pdcp_arb_tx_peek(&app->arb) != NULL || arb_hostapi_has_output(&app->api);
     return app->next_ms;
 }

@@ -25,12 +25,11 @@ typedef struct {
 typedef void (*arb_observer_t)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
 
 typedef struct {
-    const arb_port_t *port;
     uint32_t next_ms;        /* what arb_app_step returned last */
     arb_observer_t observer; /* NULL: nobody */
     void *observer_ctx;
-    bool work; /* something was handed in, or frames or bytes wait for room */
-    arb_nvm_t nvm;
+    bool work;     /* something was handed in, or frames or bytes wait for room */
+    arb_nvm_t nvm; /* and the port, of all else too */
     arb_store_t store;
     arb_limb_t limb;
     arb_hostapi_t api;

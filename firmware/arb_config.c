@@ -19,7 +19,7 @@ enum { CONFIG_CHUNK = (int)ARB_CONFIG_READ_MAX / PROFILE_TLV_ENTRY_BYTES * PROFI
 
 typedef enum {
     PHASE_IDLE = 0, /* see arb_config_busy */
-    PHASE_READ,     /* the stored string goes to the sink */
+    PHASE_READ,     /* the stored string goes to the user */
     PHASE_SCAN,     /* save, erase: where in the stored string what stands */
     PHASE_NEW,   /* the new string is compared with the stored one as long as it is the same, else written */
     PHASE_CHECK, /* the new string is read back */
@@ -59,13 +59,13 @@ static bool read_string(const arb_nvm_t *nvm, uint8_t area, uint16_t at, uint8_t
 }
 
 /* Begins to read the string of an area. */
-static void open_string(arb_config_t *config, uint8_t area, uint16_t length, const profile_tlv_sink_t *sink)
+static void open_string(arb_config_t *config, uint8_t area, uint16_t length, profile_tlv_on_link_t on_link)
 {
     config->from = area;
     config->at = 0;
     config->until = length;
     config->crc_read = ARB_CRC32_INIT;
-    profile_tlv_init(&config->reader, sink, config->ctx);
+    profile_tlv_init(&config->reader, on_link, config->ctx);
 }
 
 /* Reads on, up to CONFIG_CHUNK bytes. False: the memory has failed. */
@@ -170,7 +170,7 @@ arb_config_status_t arb_config_read(arb_config_t *config)
         return ARB_CONFIG_ERR_BUSY;
     }
     start(config, PHASE_READ, NULL);
-    open_string(config, config->newest.area, config->length, &config->user->sink);
+    open_string(config, config->newest.area, config->length, config->user->on_link);
     return ARB_CONFIG_OK;
 }
 

@@ -59,7 +59,7 @@ typedef struct {
     /* Gives link k, from 0, of the configuration to be saved. Called several times for each link, in any
      * order; what it gives must stay the same until the job is over. */
     void (*link)(void *ctx, uint8_t k, profile_link_t *link);
-    profile_tlv_sink_t sink; /* takes the links that are read */
+    profile_tlv_on_link_t on_link; /* takes the links that are read */
 } arb_config_user_t;
 
 /* Counters since the start, in the order of the host's statistics group 2. */
@@ -137,9 +137,9 @@ static inline bool arb_config_has(const arb_config_t *config, uint8_t number)
 
 /* A job begins with the first step after its start. */
 
-/* Hands all stored configurations to the user's sink, in the order in which they stand. After any end but
- * ARB_CONFIG_OK (ERR_STORAGE: the memory has failed or the copy is damaged) what was handed over must not be
- * used. */
+/* Hands the links of all stored configurations to the user's on_link, in the order in which they stand. After
+ * any end but ARB_CONFIG_OK (ERR_STORAGE: the memory has failed or the copy is damaged) what was handed over
+ * must not be used. */
 arb_config_status_t arb_config_read(arb_config_t *config);
 
 /* Stores count links as configuration *number; 0 takes the lowest free number and puts it there. A

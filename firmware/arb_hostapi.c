@@ -31,12 +31,6 @@ static const arb_message_t messages[] = {
     {ARB_MSG_EVENT_STREAM, 1, 0, 0, 0, arb_hostext_event_stream},
 };
 
-void arb_hostapi_init(arb_hostapi_t *api)
-{
-    memset(api, 0, sizeof *api);
-    arb_hostrx_init(&api->rx);
-}
-
 /* NULL: there is no message with this id. */
 static const arb_message_t *find_message(uint16_t id)
 {
@@ -286,8 +280,8 @@ uint32_t arb_hostapi_next_ms(const arb_hostapi_t *api, uint32_t now_ms)
         next_ms = api->rx.last_ms + ARB_HOSTRX_TIMEOUT_MS;
     }
     const bool blocked = arb_hostapi_has_answer(api); /* until the host reads on */
-    if (api->turn.waiting && !blocked && pdcp_time_before(api->turn.until_ms, next_ms)) {
-        next_ms = api->turn.until_ms;
+    if (api->turn.waiting && !blocked) {
+        next_ms = pdcp_time_earlier(next_ms, api->turn.until_ms);
     }
     return next_ms;
 }

@@ -70,7 +70,7 @@ typedef enum {
     ARB_HOSTAPI_COUNTERS
 } arb_hostapi_counter_t;
 
-/* Small state stands first, as in pdcp_bus.h. */
+/* All zero at first. Small state stands first, as in pdcp_bus.h. */
 typedef struct {
     arb_turn_t turn;
     arb_hostrx_request_t held[ARB_HELD_MAX]; /* in the order in which they came */
@@ -88,8 +88,6 @@ typedef struct {
     uint8_t held_bytes[ARB_HELD_BYTES]; /* their payloads, without gaps */
     uint8_t answer[ARB_HOST_HEADER + ARB_HOST_ANSWER_MAX + ARB_HOST_CRC];
 } arb_hostapi_t;
-
-void arb_hostapi_init(arb_hostapi_t *api);
 
 /* Bytes from the host. Returns how many were taken; the rest is to be offered again after the next step: the
  * host does not read its answers. */

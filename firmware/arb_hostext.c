@@ -53,10 +53,10 @@ uint8_t arb_hostext_action(arb_call_t *call)
         call->answer_len = 2;
         return error;
     }
-    if (arb_limb_is_starting(limb, call->arb)) {
+    if (arb_limb_is_starting(limb)) {
         return arb_call_wait_ready(call);
     }
-    error = arb_limb_act(limb, call->arb, call->payload[0], call->payload[1]);
+    error = arb_limb_act(limb, call->payload[0], call->payload[1]);
     if (error == ARB_ERR_BUSY) {
         return arb_call_wait_ready(call);
     }

@@ -4,11 +4,6 @@
 
 #include "pdcp_time.h"
 
-void arb_hostrx_init(arb_hostrx_t *rx)
-{
-    memset(rx, 0, sizeof *rx);
-}
-
 static void count(arb_hostrx_t *rx, arb_hostrx_counter_t counter)
 {
     rx->counters[counter]++;

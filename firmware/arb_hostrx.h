@@ -26,6 +26,7 @@ typedef enum {
     ARB_HOSTRX_COUNTERS
 } arb_hostrx_counter_t;
 
+/* All zero at first. */
 typedef struct {
     uint16_t len;
     bool overdue;     /* 100 ms without a byte: what is doubtful is decided now */
@@ -43,8 +44,6 @@ typedef struct {
     uint8_t error; /* ARB_OK; ARB_ERR_CRC: a checksum does not match; ARB_ERR_SIZE: a set request with
                       matching CRC8 and a value beyond PDCP_PARAMETER_MAX, no payload (D-API-7) */
 } arb_hostrx_request_t;
-
-void arb_hostrx_init(arb_hostrx_t *rx);
 
 /* Takes one byte. Then call arb_hostrx_next until it returns false, before the next byte. */
 void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte);

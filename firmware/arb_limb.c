@@ -23,7 +23,7 @@ typedef enum {
 static void on_link(void *ctx, uint8_t number, const profile_link_t *link);
 static void get_link(void *ctx, uint8_t k, profile_link_t *link);
 
-static const arb_config_user_t user = {.link = get_link, .sink = {.on_link = on_link}};
+static const arb_config_user_t user = {.link = get_link, .on_link = on_link};
 
 static void apply_flags(arb_limb_t *limb, uint8_t flags)
 {
@@ -35,11 +35,11 @@ static void apply_flags(arb_limb_t *limb, uint8_t flags)
     limb->run.at_events = (flags & ARB_FLAG_HOT_SWAP) != 0 ? limb->run.at_start : PROFILE_PLAN_ORIGINALS;
 }
 
-void arb_limb_init(arb_limb_t *limb, arb_nvm_t *nvm, uint8_t flags_on, uint8_t flags_off, uint32_t now_ms)
+void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
+                   uint8_t flags_off, uint32_t now_ms)
 {
-    memset(limb, 0, sizeof *limb);
     limb->told = true;
-    profile_run_init(&limb->run, now_ms);
+    profile_run_init(&limb->run, nodes, now_ms);
     arb_flags_load(&limb->flags, nvm);
     arb_config_init(&limb->config, nvm, &user, limb, now_ms);
     apply_flags(limb, (uint8_t)((arb_flags_get(&limb->flags) | flags_on) & ~flags_off));
@@ -150,8 +150,8 @@ static void compare(arb_limb_t *limb)
 
 static void score_link(arb_limb_t *limb, uint8_t number, const profile_link_t *link)
 {
-    const bool output = is_present(&limb->arb->bus.nodes, &link->output, PDCP_OUTPUT);
-    const bool input = is_present(&limb->arb->bus.nodes, &link->input, PDCP_INPUT);
+    const bool output = is_present(limb->run.scene.nodes, &link->output, PDCP_OUTPUT);
+    const bool input = is_present(limb->run.scene.nodes, &link->input, PDCP_INPUT);
     if (number != limb->number) {
         compare(limb);
         limb->number = number;
@@ -196,7 +196,6 @@ static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
 /* The bus is quiet: the start-up begins. */
 static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb)
 {
-    limb->arb = arb;
     limb->best = 0;
     limb->best_score = 0;
     limb->number = 0;
@@ -237,9 +236,9 @@ static void get_link(void *ctx, uint8_t k, profile_link_t *link)
     profile_links_get(&limb->run.links, k, link);
 }
 
-static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb)
+static uint8_t begin_save(arb_limb_t *limb)
 {
-    if (!profile_run_take_up(&limb->run, arb)) {
+    if (!profile_run_take_up(&limb->run)) {
         return ARB_ERR_STORAGE;
     }
     const arb_config_status_t status = arb_config_save(&limb->config, &limb->number, limb->run.links.count);
@@ -252,7 +251,7 @@ static uint8_t begin_save(arb_limb_t *limb, const pdcp_arb_t *arb)
 static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     limb->run.frozen = false;
-    (void)profile_run_take_up(&limb->run, arb);
+    (void)profile_run_take_up(&limb->run);
     if (limb->status >= 0) {
         limb->unsaved = false;
         pdcp_arb_plan_links(arb, true);
@@ -278,10 +277,10 @@ static void end_check(arb_limb_t *limb)
     profile_run_load_begin(&limb->run, false);
 }
 
-static void plan(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what, bool anew)
+static void plan(arb_limb_t *limb, uint8_t what, bool anew)
 {
     limb->stage = STAGE_PLAN;
-    profile_run_begin(&limb->run, arb, what, anew);
+    profile_run_begin(&limb->run, what, anew);
 }
 
 static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
@@ -292,7 +291,7 @@ static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
     }
     set_active(limb, limb->number);
     pdcp_arb_plan_links(arb, true);
-    plan(limb, arb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, true);
+    plan(limb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, true);
     limb->run.changed = false;
     limb->unsaved = false;
 }
@@ -315,7 +314,7 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
 
 /* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come.
  * After a clear, no link of the configuration is left, and none counts as working. */
-static void plan_for_host(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what, bool clear)
+static void plan_for_host(arb_limb_t *limb, uint8_t what, bool clear)
 {
     if (clear) {
         profile_run_load_begin(&limb->run, false);
@@ -324,15 +323,15 @@ static void plan_for_host(arb_limb_t *limb, const pdcp_arb_t *arb, uint8_t what,
         end(limb, ARB_OK);
         return;
     }
-    plan(limb, arb, what, clear);
+    plan(limb, what, clear);
 }
 
-bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb)
+bool arb_limb_is_starting(const arb_limb_t *limb)
 {
-    return profile_run_is_starting(&limb->run, arb);
+    return profile_run_is_starting(&limb->run);
 }
 
-uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t action, uint8_t argument)
+uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
 {
     uint8_t what = PROFILE_PLAN_ENFORCE;
     limb->ended = false;
@@ -341,13 +340,13 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t action, uint8_t 
     limb->number = argument != 0 ? argument : limb->active;
     switch ((arb_action_t)action) {
     case ARB_ACTION_SAVE:
-        return begin_save(limb, arb);
+        return begin_save(limb);
     case ARB_ACTION_LOAD:
         return begin_load(limb);
     case ARB_ACTION_ERASE:
         return begin_erase(limb);
     case ARB_ACTION_ADOPT:
-        limb->result = profile_run_adopt(&limb->run, arb);
+        limb->result = profile_run_adopt(&limb->run);
         end(limb, ARB_OK);
         return ARB_OK;
     case ARB_ACTION_AUTOCONFIGURE:
@@ -362,7 +361,7 @@ uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t action, uint8_t 
     default:
         return ARB_ERR_VALUE;
     }
-    plan_for_host(limb, arb, what, action == ARB_ACTION_CLEAR);
+    plan_for_host(limb, what, action == ARB_ACTION_CLEAR);
     return ARB_OK;
 }
 
@@ -414,7 +413,7 @@ static bool may_auto_save(const arb_limb_t *limb)
            !profile_run_is_busy(&limb->run) && (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0;
 }
 
-static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
+static void auto_save(arb_limb_t *limb, uint32_t now_ms)
 {
     if (limb->run.changed) {
         limb->run.changed = false;
@@ -424,7 +423,7 @@ static void auto_save(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
     if (may_auto_save(limb) && pdcp_time_reached(now_ms, limb->save_ms)) {
         limb->save_ms = now_ms + ARB_LIMB_AUTO_SAVE_MS; /* if it fails, again after the same time */
         limb->number = limb->active;
-        (void)begin_save(limb, arb);
+        (void)begin_save(limb);
     }
 }
 
@@ -443,22 +442,17 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
         limb->result = limb->run.moves;
         end(limb, limb->error);
     }
-    auto_save(limb, arb, now_ms);
+    auto_save(limb, now_ms);
     return handed;
-}
-
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
 }
 
 uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     uint32_t next_ms = profile_run_next_ms(&limb->run, arb, now_ms);
-    next_ms = earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
-    next_ms = earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
     if (may_auto_save(limb)) {
-        next_ms = earlier(next_ms, limb->save_ms);
+        next_ms = pdcp_time_earlier(next_ms, limb->save_ms);
     }
     return next_ms;
 }

@@ -40,20 +40,21 @@ typedef struct {
     bool ended;       /* what the host waits for is there: */
     uint8_t error;    /* arb_error_t */
     uint16_t result;
-    bool told;             /* active and stored configurations are as the host knows them */
-    bool unsaved;          /* the configuration was changed, for auto-save */
-    uint32_t save_ms;      /* auto-save: when it is due */
-    uint8_t best;          /* start-up: the best configuration so far (D-PRO-4) */
-    uint16_t best_score;   /* its score, 256 for a link with both ends, 1 for one with one end, */
-    uint16_t score;        /* and that of the one that is being read. Load: how many links it has */
-    const pdcp_arb_t *arb; /* of the start-up */
+    bool told;           /* active and stored configurations are as the host knows them */
+    bool unsaved;        /* the configuration was changed, for auto-save */
+    uint32_t save_ms;    /* auto-save: when it is due */
+    uint8_t best;        /* start-up: the best configuration so far (D-PRO-4) */
+    uint16_t best_score; /* its score, 256 for a link with both ends, 1 for one with one end, */
+    uint16_t score;      /* and that of the one that is being read. Load: how many links it has */
     arb_flags_t flags;
     arb_config_t config;
     profile_run_t run;
 } arb_limb_t;
 
-/* flags_on and flags_off override what is stored. Reads the memory: may block for as long as that takes. */
-void arb_limb_init(arb_limb_t *limb, arb_nvm_t *nvm, uint8_t flags_on, uint8_t flags_off, uint32_t now_ms);
+/* flags_on and flags_off override what is stored. nodes: the arbitrator's tables; they must outlive
+ * limb. limb is all zero before. Reads the memory: may block for as long as that takes. */
+void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
+                   uint8_t flags_off, uint32_t now_ms);
 
 /* An event of the arbitrator; hand all of them in. */
 void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms, const pdcp_event_t *event);
@@ -68,12 +69,12 @@ uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_
 bool arb_limb_is_busy(const arb_limb_t *limb);
 
 /* Are there devices, and the start-up is still to come? No action of the host may forestall it. */
-bool arb_limb_is_starting(const arb_limb_t *limb, const pdcp_arb_t *arb);
+bool arb_limb_is_starting(const arb_limb_t *limb);
 
 /* Begins an action for the host; nothing may be under way. ARB_OK: arb_limb_take_outcome will say how it
  * went. Otherwise an error, and nothing was begun: ARB_ERR_NUMBER, no such configuration; ARB_ERR_VALUE, no
  * such action; ARB_ERR_BUSY, try again. */
-uint8_t arb_limb_act(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t action, uint8_t argument);
+uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument);
 
 /* True, once, when the action has ended: error is ARB_OK or an error, result what 2408h says. */
 bool arb_limb_take_outcome(arb_limb_t *limb, uint8_t *error, uint16_t *result);

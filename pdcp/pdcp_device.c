@@ -13,11 +13,6 @@ enum {
     NO_ROOM_MS = 10         /* until a request that found the queue full is tried again */
 };
 
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(a_ms, b_ms) ? a_ms : b_ms;
-}
-
 /* --- sending --- */
 
 static bool put_frame(pdcp_device_t *dev, const can_frame_t *frame)
@@ -461,13 +456,13 @@ static uint32_t step_updates(pdcp_device_t *dev, uint32_t now_ms)
             continue;
         }
         state->ask_due = state->ask_due || again;
-        next_ms = earlier(next_ms, dev->update_deadline_ms);
+        next_ms = pdcp_time_earlier(next_ms, dev->update_deadline_ms);
         if (state->ask_due && dev->txq.count < PDCP_TX_MAX - ANSWER_ROOM) {
             const pdcp_msg_t request = {.code = PDCP_UPDATE_CHANNEL, .channel = (uint8_t)(i + 1)};
             pdcp_device_put(dev, &request);
             state->ask_due = false;
         } else if (state->ask_due) {
-            next_ms = earlier(next_ms, now_ms + NO_ROOM_MS);
+            next_ms = pdcp_time_earlier(next_ms, now_ms + NO_ROOM_MS);
         }
     }
     return next_ms;
@@ -496,9 +491,9 @@ static uint32_t step_bound(pdcp_device_t *dev, uint32_t now_ms)
         enter(dev, PDCP_DEVICE_ALONE, now_ms);
         return step_alone(dev, now_ms);
     }
-    uint32_t next_ms = earlier(silence_ms, step_beacon(dev, now_ms));
-    next_ms = earlier(next_ms, step_updates(dev, now_ms));
-    return earlier(next_ms, pdcp_device_bulk_step(dev, now_ms));
+    uint32_t next_ms = pdcp_time_earlier(silence_ms, step_beacon(dev, now_ms));
+    next_ms = pdcp_time_earlier(next_ms, step_updates(dev, now_ms));
+    return pdcp_time_earlier(next_ms, pdcp_device_bulk_step(dev, now_ms));
 }
 
 uint32_t pdcp_device_step(pdcp_device_t *dev, uint32_t now_ms)
@@ -512,7 +507,8 @@ uint32_t pdcp_device_step(pdcp_device_t *dev, uint32_t now_ms)
         dev->suspended = false;
     }
     const uint32_t next_ms = steps[dev->state](dev, now_ms);
-    return dev->suspended && !dev->suspended_for_good ? earlier(next_ms, dev->suspend_deadline_ms) : next_ms;
+    return dev->suspended && !dev->suspended_for_good ? pdcp_time_earlier(next_ms, dev->suspend_deadline_ms)
+                                                      : next_ms;
 }
 
 /* --- the whole --- */

@@ -19,4 +19,10 @@ static inline bool pdcp_time_reached(uint32_t now_ms, uint32_t deadline_ms)
     return !pdcp_time_before(now_ms, deadline_ms);
 }
 
+/* The one of two times that comes first. */
+static inline uint32_t pdcp_time_earlier(uint32_t a_ms, uint32_t b_ms)
+{
+    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
+}
+
 #endif

@@ -56,12 +56,11 @@ typedef struct {
     const pdcp_nodes_t *nodes;
     profile_links_t *links; /* changed only when the plan is done: their stand_in, and entries are removed by
                                PROFILE_PLAN_ENFORCE */
-    const uint8_t *made;    /* bit per channel: links that this plan has made in vain so far do not count as
-                               working; PROFILE_CHANNEL_BYTES bytes */
-    const uint8_t *awaited; /* bit per place: the device is away for a moment only and is not replaced;
-                               PROFILE_PLACE_BYTES bytes */
-    const profile_pair_t *banned;
+    uint8_t made[PROFILE_CHANNEL_BYTES];  /* inputs whose links do not count as working: those that the plan
+                                             has made so far */
+    uint8_t awaited[PROFILE_PLACE_BYTES]; /* devices that are away for a moment only and not replaced */
     uint8_t banned_count;
+    profile_pair_t banned[PROFILE_BANNED_MAX];
 } profile_scene_t;
 
 /* One input that is being connected. */

@@ -13,7 +13,7 @@ static void wait_for_start(profile_run_t *run, uint32_t now_ms)
         profile_links_init(&run->links);
     }
     memset(run->dropping, 0, sizeof run->dropping);
-    memset(run->awaited, 0, sizeof run->awaited);
+    memset(run->scene.awaited, 0, sizeof run->scene.awaited);
     run->state = PROFILE_WAITING;
     run->due = 0;
     run->making = PROFILE_NOT_MAKING;
@@ -21,9 +21,10 @@ static void wait_for_start(profile_run_t *run, uint32_t now_ms)
     run->stirred_ms = now_ms;
 }
 
-void profile_run_init(profile_run_t *run, uint32_t now_ms)
+void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms)
 {
-    memset(run, 0, sizeof *run);
+    run->scene.nodes = nodes;
+    run->scene.links = &run->links;
     run->stirred_ms = now_ms;
 }
 
@@ -49,8 +50,9 @@ static void remove_entry(profile_run_t *run, uint8_t entry)
 /* Makes the link that an input has, or whose source it names, one of the configuration. By itself it does not
  * become one that breaks sole access: a device may remember what it stood in for once. False: there was no
  * room. */
-static bool adopt_link(profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t input, bool by_host)
+static bool adopt_link(profile_run_t *run, uint8_t input, bool by_host)
 {
+    const pdcp_nodes_t *nodes = run->scene.nodes;
     profile_link_t link;
     profile_end_of(nodes, input, &link.input);
     if (run->frozen || !profile_source_of(nodes, input, &link.output) ||
@@ -75,24 +77,17 @@ static uint8_t stood_in_for(const profile_run_t *run, uint8_t input)
     return PDCP_NONE;
 }
 
-static uint8_t entry_of(const profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t input)
+static uint8_t entry_of(const profile_run_t *run, uint8_t input)
 {
-    return profile_links_of(&run->links, nodes, input);
+    return profile_links_of(&run->links, run->scene.nodes, input);
 }
 
-/* Has the input a link that works? */
-static bool works(const pdcp_nodes_t *nodes, uint8_t input)
+bool profile_run_take_up(profile_run_t *run)
 {
-    return nodes->channels[input].link == PDCP_LINK_ACTIVE && profile_is_ready(nodes, input, PDCP_INPUT);
-}
-
-bool profile_run_take_up(profile_run_t *run, const pdcp_arb_t *arb)
-{
-    const pdcp_nodes_t *nodes = &arb->bus.nodes;
     bool complete = true;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (works(nodes, i) && entry_of(run, nodes, i) == PDCP_NONE && stood_in_for(run, i) == PDCP_NONE &&
-            !adopt_link(run, nodes, i, false)) {
+        if (profile_feed(run->scene.nodes, i) != PDCP_NONE && entry_of(run, i) == PDCP_NONE &&
+            stood_in_for(run, i) == PDCP_NONE && !adopt_link(run, i, false)) {
             complete = false;
         }
     }
@@ -119,12 +114,12 @@ static uint8_t next_input_of(const pdcp_nodes_t *nodes, uint8_t node, uint8_t la
 /* Reads the configuration back from what the inputs of a device name as their sources; PDCP_NONE: of all. In
  * an order that does not depend on where they stand: of two that claim the same output the first one has it.
  */
-static void read_back(profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t node)
+static void read_back(profile_run_t *run, uint8_t node)
 {
     uint8_t input = PDCP_NONE;
-    while ((input = next_input_of(nodes, node, input)) != PDCP_NONE) {
-        if (entry_of(run, nodes, input) == PDCP_NONE) {
-            (void)adopt_link(run, nodes, input, false);
+    while ((input = next_input_of(run->scene.nodes, node, input)) != PDCP_NONE) {
+        if (entry_of(run, input) == PDCP_NONE) {
+            (void)adopt_link(run, input, false);
         }
     }
 }
@@ -144,30 +139,34 @@ bool profile_run_load_link(profile_run_t *run, const profile_link_t *link)
            store_link(run, link, false);
 }
 
-/* The entry that the working link of an input replaces: the one that it stands in for, or its own if its
+/* The entry that an input's link, if it works, replaces: the one that it stands in for, or its own if its
  * source is another. PDCP_NONE: there is none. */
-static uint8_t replaced_by(const profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t input)
+static uint8_t replaced_by(const profile_run_t *run, uint8_t input)
 {
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const uint8_t feed = profile_feed(nodes, input);
+    if (feed == PDCP_NONE) {
+        return PDCP_NONE;
+    }
     uint8_t entry = stood_in_for(run, input);
     if (entry == PDCP_NONE) {
-        entry = entry_of(run, nodes, input);
+        entry = entry_of(run, input);
         if (entry != PDCP_NONE && profile_links_channel(&run->links, nodes, &run->links.entries[entry].output,
-                                                        PDCP_OUTPUT) == nodes->channels[input].feed) {
+                                                        PDCP_OUTPUT) == feed) {
             return PDCP_NONE;
         }
     }
     return entry;
 }
 
-uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb)
+uint8_t profile_run_adopt(profile_run_t *run)
 {
-    const pdcp_nodes_t *nodes = &arb->bus.nodes;
     uint8_t adopted = 0;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const uint8_t entry = works(nodes, i) ? replaced_by(run, nodes, i) : PDCP_NONE;
+        const uint8_t entry = replaced_by(run, i);
         if (entry != PDCP_NONE) {
             remove_entry(run, entry);
-            (void)adopt_link(run, nodes, i, false);
+            (void)adopt_link(run, i, false);
             adopted++;
         }
     }
@@ -175,17 +174,6 @@ uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb)
 }
 
 /* --- Events --- */
-
-static profile_scene_t scene_of(profile_run_t *run, const pdcp_nodes_t *nodes)
-{
-    const profile_scene_t scene = {.nodes = nodes,
-                                   .links = &run->links,
-                                   .made = run->made,
-                                   .awaited = run->awaited,
-                                   .banned = run->banned,
-                                   .banned_count = run->banned_count};
-    return scene;
-}
 
 /* The next plan is due, for what is due already and this. Before the start-up there are none. */
 static void make_due(profile_run_t *run, uint8_t what)
@@ -200,7 +188,7 @@ static void make_due(profile_run_t *run, uint8_t what)
 static void plan_all(profile_run_t *run, uint32_t now_ms)
 {
     run->stirred_ms = now_ms;
-    run->banned_count = 0;
+    run->scene.banned_count = 0;
     make_due(run, run->at_events);
 }
 
@@ -208,13 +196,13 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
 {
     const bool urgent = run->urgent;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
-        if (arb->bus.nodes.channels[i].node == node) {
+        if (run->scene.nodes->channels[i].node == node) {
             profile_set_bit(run->dropping, i, false);
         }
     }
-    profile_set_bit(run->awaited, node, false);
+    profile_set_bit(run->scene.awaited, node, false);
     if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
-        read_back(run, &arb->bus.nodes, node);
+        read_back(run, node);
     }
     if (run->due == 0) {
         run->arrival_ms = now_ms + PROFILE_ARRIVAL_MS;
@@ -226,10 +214,11 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
 /* The oldest of too many is tried again. */
 static void ban(profile_run_t *run, uint32_t now_ms)
 {
-    memmove(&run->banned[1], &run->banned[0], sizeof run->banned - sizeof run->banned[0]);
-    run->banned[0] = run->wish;
-    if (run->banned_count < PROFILE_BANNED_MAX) {
-        run->banned_count++;
+    memmove(&run->scene.banned[1], &run->scene.banned[0],
+            sizeof run->scene.banned - sizeof run->scene.banned[0]);
+    run->scene.banned[0] = run->wish;
+    if (run->scene.banned_count < PROFILE_BANNED_MAX) {
+        run->scene.banned_count++;
     }
     run->tries = 0;
     run->retry_ms = now_ms + PROFILE_RETRY_MS;
@@ -242,7 +231,7 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
     run->wishing = false;
     if (status == PDCP_OK) {
         run->tries = 0;
-        profile_set_bit(run->made, run->wish.input, true);
+        profile_set_bit(run->scene.made, run->wish.input, true);
         run->moves++;
         return;
     }
@@ -256,25 +245,23 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
 }
 
 /* Is the working link of an input another one than the plan knows or wants? */
-static bool is_unexpected(profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t input)
+static bool is_unexpected(const profile_run_t *run, uint8_t input)
 {
-    if (run->making == PROFILE_MAKING) {
-        const profile_scene_t scene = scene_of(run, nodes);
-        return profile_plan_links_differ(&run->plan, &scene);
-    }
-    return nodes->channels[input].feed != run->plan.want[input];
+    return run->making == PROFILE_MAKING ? profile_plan_links_differ(&run->plan, &run->scene)
+                                         : run->scene.nodes->channels[input].feed != run->plan.want[input];
 }
 
 /* An input's device has asked for its link (Update Data Channel). It may lack what it requires, or break sole
  * access: then it does not count as working, and the plan decides. */
-static void on_asked(profile_run_t *run, const pdcp_nodes_t *nodes, uint8_t input, uint8_t entry)
+static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
 {
+    const pdcp_nodes_t *nodes = run->scene.nodes;
     const pdcp_channel_t *channel = &nodes->channels[input];
     if (entry == PDCP_NONE && stood_in_for(run, input) == PDCP_NONE) {
-        (void)adopt_link(run, nodes, input, false);
+        (void)adopt_link(run, input, false);
     }
-    if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, nodes, input)) {
-        profile_set_bit(run->made, input, profile_breaks_sole_access(nodes, channel->feed, input));
+    if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
+        profile_set_bit(run->scene.made, input, profile_breaks_sole_access(nodes, channel->feed, input));
         make_due(run, run->at_events);
     }
 }
@@ -294,16 +281,15 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 /* The link of an input has changed, by whomever. */
 static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
-    const pdcp_nodes_t *nodes = &arb->bus.nodes;
-    const uint8_t entry = entry_of(run, nodes, input);
+    const uint8_t entry = entry_of(run, input);
     const bool dropping = profile_bit(run->dropping, input);
-    if (nodes->channels[input].link == PDCP_LINK_NONE) {
+    if (run->scene.nodes->channels[input].link == PDCP_LINK_NONE) {
         profile_set_bit(run->dropping, input, false);
         if (arb->bus.link.kind == PDCP_TODO_REMOVE && !dropping) {
             on_removed(run, input, entry);
         }
     } else if (run->state != PROFILE_WAITING && !arb->bus.link.stored && !run->wishing && !dropping) {
-        on_asked(run, nodes, input, entry);
+        on_asked(run, input, entry);
     }
 }
 
@@ -320,7 +306,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         break;
     case PDCP_EVENT_RESET:
         if (event->status == PDCP_OK) {
-            profile_set_bit(run->awaited, event->node, true);
+            profile_set_bit(run->scene.awaited, event->node, true);
             run->awaited_ms = now_ms + PROFILE_RESET_MS;
         }
         break;
@@ -328,7 +314,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         if (run->wishing) {
             on_wish(run, now_ms, (pdcp_status_t)event->status);
         } else if (event->status == PDCP_OK) { /* the host's: what rested for want of it comes back */
-            (void)adopt_link(run, &arb->bus.nodes, event->channel, true);
+            (void)adopt_link(run, event->channel, true);
             make_due(run, PROFILE_PLAN_ORIGINALS);
         }
         break;
@@ -350,19 +336,20 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
 
 /* What the plan under way was about to take away does not count as working for the next one, which would not
  * know any more that it only stood in. */
-static void leave_unwanted(profile_run_t *run, const pdcp_nodes_t *nodes)
+static void leave_unwanted(profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (works(nodes, i) && nodes->channels[i].feed != run->plan.want[i]) {
-            profile_set_bit(run->made, i, true);
+        const uint8_t feed = profile_feed(run->scene.nodes, i);
+        if (feed != PDCP_NONE && feed != run->plan.want[i]) {
+            profile_set_bit(run->scene.made, i, true);
         }
     }
 }
 
-static void begin_plan(profile_run_t *run, const pdcp_arb_t *arb)
+static void begin_plan(profile_run_t *run)
 {
     if (run->state == PROFILE_CONFIGURING && run->making != PROFILE_MAKING) {
-        leave_unwanted(run, &arb->bus.nodes);
+        leave_unwanted(run);
     }
     run->state = PROFILE_CONFIGURING;
     run->due = 0;
@@ -373,58 +360,57 @@ static void begin_plan(profile_run_t *run, const pdcp_arb_t *arb)
 
 /* Makes a slice of the plan, of a new one if what it is made from has changed. Nothing of it counts before it
  * is done. */
-static void make_slice(profile_run_t *run, const pdcp_arb_t *arb)
+static void make_slice(profile_run_t *run)
 {
-    const profile_scene_t scene = scene_of(run, &arb->bus.nodes);
-    if (run->stale || profile_plan_is_stale(&run->plan, &scene)) {
+    if (run->stale || profile_plan_is_stale(&run->plan, &run->scene)) {
         run->stale = false;
-        profile_plan_begin(&run->plan, &scene, run->what);
+        profile_plan_begin(&run->plan, &run->scene, run->what);
     }
-    if (profile_plan_step(&run->plan, &scene, PROFILE_PLAN_SLICE)) {
+    if (profile_plan_step(&run->plan, &run->scene, PROFILE_PLAN_SLICE)) {
         run->making = PROFILE_JUST_MADE;
     }
 }
 
 /* Only links that the host has made count as working: all others are planned anew. */
-static void forget_working(profile_run_t *run, const pdcp_nodes_t *nodes)
+static void forget_working(profile_run_t *run)
 {
-    memset(run->made, 0xFF, sizeof run->made);
+    memset(run->scene.made, 0xFF, sizeof run->scene.made);
     for (uint8_t e = 0; e < run->links.count; e++) {
         const profile_entry_t *entry = &run->links.entries[e];
-        const uint8_t input = profile_links_channel(&run->links, nodes, &entry->input, PDCP_INPUT);
+        const uint8_t input = profile_links_channel(&run->links, run->scene.nodes, &entry->input, PDCP_INPUT);
         if (entry->by_host && input != PDCP_NONE) {
-            profile_set_bit(run->made, input, false);
+            profile_set_bit(run->scene.made, input, false);
         }
     }
 }
 
-void profile_run_begin(profile_run_t *run, const pdcp_arb_t *arb, uint8_t what, bool anew)
+void profile_run_begin(profile_run_t *run, uint8_t what, bool anew)
 {
-    memset(run->made, 0, sizeof run->made);
+    memset(run->scene.made, 0, sizeof run->scene.made);
     if (anew) {
-        forget_working(run, &arb->bus.nodes);
+        forget_working(run);
         run->changed = true;
     }
-    run->banned_count = 0;
+    run->scene.banned_count = 0;
     run->tries = 0;
     run->moves = 0;
     run->what = what;
-    begin_plan(run, arb);
+    begin_plan(run);
 }
 
 void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored)
 {
     pdcp_arb_plan_links(arb, stored);
     if (!stored) {
-        read_back(run, &arb->bus.nodes, PDCP_NONE);
+        read_back(run, PDCP_NONE);
     }
-    profile_run_begin(run, arb, run->at_start, true);
+    profile_run_begin(run, run->at_start, true);
 }
 
-bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb)
+bool profile_run_is_starting(const profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_WAITING; i++) {
-        if (arb->bus.nodes.nodes[i].state == PDCP_NODE_READY) {
+        if (run->scene.nodes->nodes[i].state == PDCP_NODE_READY) {
             return true;
         }
     }
@@ -440,7 +426,7 @@ static uint32_t quiet_ms(const profile_run_t *run, const pdcp_arb_t *arb)
 
 bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    return profile_run_is_starting(run, arb) && !pdcp_arb_setup_running(arb) && pdcp_arb_links_settled(arb) &&
+    return profile_run_is_starting(run) && !pdcp_arb_setup_running(arb) && pdcp_arb_links_settled(arb) &&
            pdcp_time_reached(now_ms, quiet_ms(run, arb));
 }
 
@@ -450,8 +436,8 @@ bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint3
  * link of the configuration whose source is missing as inactive (D-BUS-10). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
-    const pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
-    const uint8_t entry = entry_of(run, &arb->bus.nodes, input);
+    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    const uint8_t entry = entry_of(run, input);
     pdcp_link_source_t source = {.index = 0};
     if (entry != PDCP_NONE) {
         const profile_ref_t *output = &run->links.entries[entry].output;
@@ -484,7 +470,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
 static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (run->plan.want[i] == PDCP_NONE && profile_is_ready(&arb->bus.nodes, i, PDCP_INPUT)) {
+        if (run->plan.want[i] == PDCP_NONE && profile_is_ready(run->scene.nodes, i, PDCP_INPUT)) {
             unlink_one(run, arb, now_ms, i);
         }
     }
@@ -492,8 +478,9 @@ static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 
 /* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have
  * gone since the plan was made are the next plan's business. */
-static uint8_t next_input(const profile_run_t *run, const pdcp_nodes_t *nodes)
+static uint8_t next_input(const profile_run_t *run)
 {
+    const pdcp_nodes_t *nodes = run->scene.nodes;
     uint8_t found = PDCP_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t output = run->plan.want[i];
@@ -512,12 +499,12 @@ static uint8_t next_input(const profile_run_t *run, const pdcp_nodes_t *nodes)
     return found;
 }
 
-static void finish(profile_run_t *run, const pdcp_arb_t *arb)
+static void finish(profile_run_t *run)
 {
     run->state = PROFILE_RUNNING;
     run->what = 0;
-    memset(run->made, 0, sizeof run->made);
-    (void)profile_run_take_up(run, arb);
+    memset(run->scene.made, 0, sizeof run->scene.made);
+    (void)profile_run_take_up(run);
 }
 
 /* Does the next thing that the plan says, when what came before is done. True: the arbitrator has something
@@ -531,9 +518,9 @@ static bool carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     if (!pdcp_arb_links_settled(arb)) {
         return true;
     }
-    const uint8_t input = next_input(run, &arb->bus.nodes);
+    const uint8_t input = next_input(run);
     if (input == PDCP_NONE) {
-        finish(run, arb);
+        finish(run);
         return false;
     }
     run->wish.input = input;
@@ -549,14 +536,9 @@ static bool has_awaited(const profile_run_t *run)
 {
     uint8_t all = 0;
     for (uint8_t i = 0; i < (uint8_t)PROFILE_PLACE_BYTES; i++) {
-        all |= run->awaited[i];
+        all |= run->scene.awaited[i];
     }
     return all != 0;
-}
-
-static uint32_t earlier(uint32_t a_ms, uint32_t b_ms)
-{
-    return pdcp_time_before(b_ms, a_ms) ? b_ms : a_ms;
 }
 
 /* When a plan is due though nothing happens: a device is awaited no longer, or links are tried again. */
@@ -566,8 +548,8 @@ static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
     if (has_awaited(run)) {
         next_ms = run->awaited_ms;
     }
-    if (run->banned_count != 0 && run->state != PROFILE_CONFIGURING) {
-        next_ms = earlier(next_ms, run->retry_ms);
+    if (run->scene.banned_count != 0 && run->state != PROFILE_CONFIGURING) {
+        next_ms = pdcp_time_earlier(next_ms, run->retry_ms);
     }
     return next_ms;
 }
@@ -587,7 +569,7 @@ bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
     if (pdcp_time_reached(now_ms, alarm_ms(run, now_ms))) {
         if (pdcp_time_reached(now_ms, run->awaited_ms)) {
-            memset(run->awaited, 0, sizeof run->awaited);
+            memset(run->scene.awaited, 0, sizeof run->scene.awaited);
         }
         plan_all(run, now_ms);
     }
@@ -596,10 +578,10 @@ bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
     if (run->due != 0 && !is_held_back(run, arb, now_ms)) {
         run->what |= run->due;
-        begin_plan(run, arb);
+        begin_plan(run);
     }
     if (run->making == PROFILE_MAKING) {
-        make_slice(run, arb);
+        make_slice(run);
         return false;
     }
     run->making = PROFILE_NOT_MAKING;
@@ -617,7 +599,7 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);
     if (run->due != 0 && run->state != PROFILE_CONFIGURING && is_held_back(run, arb, now_ms)) {
-        return earlier(next_ms, run->arrival_ms);
+        return pdcp_time_earlier(next_ms, run->arrival_ms);
     }
     return next_ms;
 }

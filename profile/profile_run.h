@@ -40,18 +40,17 @@ typedef enum {
 /* Small state stands first: on the smallest part, a field that lies farther than 511 bytes from the beginning
  * costs twice the instructions. */
 typedef struct {
-    uint8_t made[PROFILE_CHANNEL_BYTES];     /* inputs linked by the plan under way */
+    profile_scene_t scene; /* made: inputs linked by the plan under way; awaited: devices that
+                              the host has reset */
     uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* inputs whose links this layer is taking away */
-    uint8_t awaited[PROFILE_PLACE_BYTES];    /* devices that the host has reset */
-    uint8_t banned_count;
-    uint8_t tries;       /* of the link that is being made, those before this one */
-    uint8_t state;       /* profile_state_t */
-    uint8_t what;        /* profile_plan_what_t of the plan under way, 0: none is */
-    uint8_t due;         /* of the plan to be made next, 0: none is */
-    uint8_t making;      /* profile_making_t */
-    bool stale;          /* and what it is made from has changed */
-    bool wishing;        /* a link has been asked for, */
-    profile_pair_t wish; /* this one */
+    uint8_t tries;                           /* of the link that is being made, those before this one */
+    uint8_t state;                           /* profile_state_t */
+    uint8_t what;                            /* profile_plan_what_t of the plan under way, 0: none is */
+    uint8_t due;                             /* of the plan to be made next, 0: none is */
+    uint8_t making;                          /* profile_making_t */
+    bool stale;                              /* and what it is made from has changed */
+    bool wishing;                            /* a link has been asked for, */
+    profile_pair_t wish;                     /* this one */
     bool urgent;         /* the plan that is due does not wait for devices being set up; never without due */
     uint8_t at_start;    /* what may be planned at the start-up, */
     uint8_t at_events;   /* and when devices come or go: profile_plan_what_t, by the flags of 2404h */
@@ -62,19 +61,19 @@ typedef struct {
     uint32_t arrival_ms; /* the plan that is due waits so long at most, unless it is urgent */
     uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
     uint32_t retry_ms;   /* means something while links are banned */
-    profile_pair_t banned[PROFILE_BANNED_MAX];
     profile_plan_t plan;
     profile_links_t links; /* the active configuration */
 } profile_run_t;
 
-void profile_run_init(profile_run_t *run, uint32_t now_ms);
+/* run is all zero before. nodes: the arbitrator's tables; they must outlive run. */
+void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms);
 
 /* An event of the arbitrator; hand all of them in. */
 void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
                           const pdcp_event_t *event);
 
 /* Is a device set up, and the start-up still to come? */
-bool profile_run_is_starting(const profile_run_t *run, const pdcp_arb_t *arb);
+bool profile_run_is_starting(const profile_run_t *run);
 
 /* May the start-up begin: is a device set up, no link half made, and has there been quiet for
  * PROFILE_QUIET_MS? */
@@ -92,14 +91,14 @@ void profile_run_start(profile_run_t *run, pdcp_arb_t *arb, bool stored);
 
 /* Begins a plan, profile_plan_what_t bits. anew: from nothing but the links that the host has made, others
  * that are not in the configuration go; else from the links that work. */
-void profile_run_begin(profile_run_t *run, const pdcp_arb_t *arb, uint8_t what, bool anew);
+void profile_run_begin(profile_run_t *run, uint8_t what, bool anew);
 
 /* Makes what stands in for missing ends the configuration. Returns how many links have changed. */
-uint8_t profile_run_adopt(profile_run_t *run, const pdcp_arb_t *arb);
+uint8_t profile_run_adopt(profile_run_t *run);
 
 /* Makes links that work without being in the active configuration part of it, unless it is frozen. False: one
  * is left out, for want of room. */
-bool profile_run_take_up(profile_run_t *run, const pdcp_arb_t *arb);
+bool profile_run_take_up(profile_run_t *run);
 
 /* Does what is due. True: the arbitrator was given something to do. */
 bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms);

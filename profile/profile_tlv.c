@@ -13,17 +13,17 @@ enum {
     TLV_OF_LINK = TLV_LINK | TLV_INPUT | TLV_OUTPUT
 };
 
-void profile_tlv_init(profile_tlv_t *reader, const profile_tlv_sink_t *sink, void *ctx)
+void profile_tlv_init(profile_tlv_t *reader, profile_tlv_on_link_t on_link, void *ctx)
 {
     memset(reader, 0, sizeof *reader);
-    reader->sink = sink;
+    reader->on_link = on_link;
     reader->ctx = ctx;
 }
 
 static void end_link(profile_tlv_t *reader)
 {
-    if ((reader->state & TLV_LINK) != 0 && reader->sink != NULL && reader->sink->on_link != NULL) {
-        reader->sink->on_link(reader->ctx, reader->number, &reader->link);
+    if ((reader->state & TLV_LINK) != 0 && reader->on_link != NULL) {
+        reader->on_link(reader->ctx, reader->number, &reader->link);
     }
     reader->state = (uint8_t)(reader->state & ~(unsigned)TLV_OF_LINK);
     reader->end = 0;
@@ -74,9 +74,6 @@ static profile_tlv_status_t begin_configuration(profile_tlv_t *reader, uint16_t 
     reader->state &= TLV_CONFIGURATIONS;
     reader->number = (uint8_t)value;
     reader->configurations_read++;
-    if (reader->sink != NULL && reader->sink->on_configuration != NULL) {
-        reader->sink->on_configuration(reader->ctx, reader->number);
-    }
     return PROFILE_TLV_MORE;
 }
 

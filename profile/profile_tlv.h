@@ -47,14 +47,9 @@ enum {
 
 /* Reader ------------------------------------------------------------------------------------------------- */
 
-/* Told of what is read, while it is read: the string may still turn out to be bad. A member may be NULL. The
- * functions must not call back into the reader. */
-typedef struct {
-    /* A configuration begins. */
-    void (*on_configuration)(void *ctx, uint8_t number);
-    /* A link is complete. It belongs to the reader and lasts for the call. */
-    void (*on_link)(void *ctx, uint8_t number, const profile_link_t *link);
-} profile_tlv_sink_t;
+/* Told of a link of configuration number when it is complete; the string may still turn out to be bad. The
+ * link belongs to the reader and lasts for the call. Must not call back into the reader. */
+typedef void (*profile_tlv_on_link_t)(void *ctx, uint8_t number, const profile_link_t *link);
 
 typedef enum {
     PROFILE_TLV_MORE = 0,       /* good so far; a string that stops here has no end and is bad */
@@ -68,7 +63,7 @@ typedef enum {
 /* Reads a string of any length, byte by byte. It skips codes that it does not know, takes missing values as 0
  * and input and output of a link in either order. Members are private but for numbers. */
 typedef struct {
-    const profile_tlv_sink_t *sink; /* NULL: nobody is told */
+    profile_tlv_on_link_t on_link; /* NULL: nobody is told */
     void *ctx;
     profile_link_t link;                    /* the one being read */
     uint8_t numbers[PROFILE_TLV_SET_BYTES]; /* the configurations so far, bit n: configuration n */
@@ -84,8 +79,8 @@ typedef struct {
     int8_t status; /* profile_tlv_status_t */
 } profile_tlv_t;
 
-/* sink and ctx must outlive the reading. */
-void profile_tlv_init(profile_tlv_t *reader, const profile_tlv_sink_t *sink, void *ctx);
+/* on_link: NULL, nobody is told. */
+void profile_tlv_init(profile_tlv_t *reader, profile_tlv_on_link_t on_link, void *ctx);
 
 /* Takes the next bytes; after an error or the end they are ignored. Returns how it stands. */
 profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *bytes, uint16_t len);

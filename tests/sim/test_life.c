@@ -580,7 +580,7 @@ static void test_a_device_goes_while_sole_access_is_enforced(void)
     limb->world.bus.fault = lose_all;
     TEST_ASSERT_TRUE(
         pdcp_arb_disconnect(arb, pdcp_nodes_channel(&arb->bus.nodes, place, 1))); /* unanswered: 300 ms */
-    profile_run_begin(&limb->app.limb.run, arb, PROFILE_PLAN_ENFORCE, false);
+    profile_run_begin(&limb->app.limb.run, PROFILE_PLAN_ENFORCE, false);
     sim_world_touch_app(&limb->world);
     limb_run_ms(limb, 400);
     TEST_ASSERT_TRUE(limb->lost.time_us != 0);

@@ -272,12 +272,10 @@ void systems_link(systems_t *s, const char *links)
 
 profile_scene_t systems_scene(systems_t *s)
 {
-    const profile_scene_t scene = {.nodes = &s->nodes,
-                                   .links = &s->links,
-                                   .made = s->made,
-                                   .awaited = s->awaited,
-                                   .banned = s->banned,
-                                   .banned_count = s->banned_count};
+    profile_scene_t scene = {.nodes = &s->nodes, .links = &s->links, .banned_count = s->banned_count};
+    memcpy(scene.made, s->made, sizeof scene.made);
+    memcpy(scene.awaited, s->awaited, sizeof scene.awaited);
+    memcpy(scene.banned, s->banned, sizeof scene.banned);
     return scene;
 }
 

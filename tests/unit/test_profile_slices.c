@@ -67,7 +67,7 @@ static int finish_plan(void)
 
 static void begin_plan(void)
 {
-    profile_run_begin(&app.limb.run, &app.arb, PROFILE_PLAN_ALL, true);
+    profile_run_begin(&app.limb.run, PROFILE_PLAN_ALL, true);
 }
 
 static void tell(pdcp_event_kind_t kind, uint8_t node)

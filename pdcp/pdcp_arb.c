@@ -205,7 +205,9 @@ static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 /* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
 static bool is_young(pdcp_arb_t *arb)
 {
-    arb->young = arb->young && pdcp_time_before(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS);
+    if (pdcp_time_reached(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS)) {
+        arb->young = false;
+    }
     return arb->young;
 }
 
@@ -346,8 +348,10 @@ static void host_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *rep
     pdcp_host_request_t *host = &arb->host;
     const uint16_t end = (uint16_t)(reply->offset + reply->len);
     const bool raw = host->client == PDCP_CLIENT_RAW;
-    const bool success =
-        reply->status == PDCP_OK && (!raw || reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
+    bool success = reply->status == PDCP_OK;
+    if (raw && reply->len >= 2 && reply->bytes[1] != PDCP_SUCCESS) {
+        success = false;
+    }
     if (success && host->code == PDCP_SET_PARAMETER) {
         host_has_set(arb);
     }
@@ -449,36 +453,32 @@ static bool is_deprecated(uint8_t code)
 /* May a device send this code? All answers but those that it gets itself. */
 static bool is_from_device(uint8_t code)
 {
-    const unsigned from_arbitrator = 1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL;
+    const unsigned answers = 0xFFFFu ^ (1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL);
     const unsigned requests = 1u << PDCP_BULK_DATA | 1u << PDCP_UPDATE_CHANNEL;
-    return (code & PDCP_ANSWER) != 0 ? !is_in(from_arbitrator, code) : is_in(requests, code);
+    return is_in((code & PDCP_ANSWER) != 0 ? answers : requests, code);
 }
 
 static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
-    const uint32_t late = arb->bus.stats[PDCP_STAT_DROP_LATE];
-    pdcp_stat_t stat = PDCP_STAT_TAKEN;
     bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
     if (!replied) {
         const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
         if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
-            stat = PDCP_STAT_DROP_BAD_CODE;
+            count(arb, PDCP_STAT_DROP_BAD_CODE);
         } else if (decoded == PDCP_DECODE_BAD_DLC) {
-            stat = PDCP_STAT_DROP_BAD_DLC;
+            count(arb, PDCP_STAT_DROP_BAD_DLC);
         } else if (is_deprecated(msg.code)) {
-            stat = PDCP_STAT_DROP_DEPRECATED;
+            count(arb, PDCP_STAT_DROP_DEPRECATED);
         } else if (!is_from_device(msg.code)) {
-            stat = PDCP_STAT_DROP_DIRECTION;
+            count(arb, PDCP_STAT_DROP_DIRECTION);
         } else if (msg.code == PDCP_UPDATE_CHANNEL) {
+            count(arb, PDCP_STAT_TAKEN);
             pdcp_link_on_update(&arb->bus, node, msg.channel);
         } else {
             replied = pdcp_request_on_message(&arb->bus, node, &msg, &reply);
         }
-    }
-    if (arb->bus.stats[PDCP_STAT_DROP_LATE] == late) {
-        count(arb, stat);
     }
     if (replied) {
         on_reply(arb, node, &reply);
@@ -563,7 +563,10 @@ static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
  * has its answer in time. */
 static void limit_host_wait(pdcp_arb_t *arb)
 {
-    const bool waits = arb->host.waiting || arb->bus.link.wish_input != PDCP_NONE;
+    bool waits = arb->host.waiting;
+    if (arb->bus.link.wish_input != PDCP_NONE) {
+        waits = true;
+    }
     const bool limited = pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_HOST);
     if (waits && !limited) {
         pdcp_bus_wake(&arb->bus, PDCP_TIMER_HOST, PDCP_HOST_WAIT_MS);
@@ -633,12 +636,12 @@ void pdcp_arb_tx_pop(pdcp_arb_t *arb)
 }
 
 /* Can the device be asked? */
-static bool is_bound(const pdcp_arb_t *arb, uint8_t node)
+static bool is_bound(pdcp_arb_t *arb, uint8_t node)
 {
     if (node >= PDCP_DEVICES_MAX) {
         return false;
     }
-    const uint8_t state = arb->bus.nodes.nodes[node].state;
+    const uint8_t state = node_of(arb, node)->state;
     return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST;
 }
 

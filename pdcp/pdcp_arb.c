@@ -67,8 +67,12 @@ static void expect_life(pdcp_arb_t *arb, uint8_t node)
     set_life(arb, node, silence_ms(node_of(arb, node)));
 }
 
+/* The host's request, if it has one, ends. */
 static void host_ends(pdcp_arb_t *arb, pdcp_status_t status)
 {
+    if (!arb->host.active) {
+        return;
+    }
     arb->host.active = false;
     arb->host.waiting = false;
     const pdcp_event_t event = {.kind = PDCP_EVENT_REQUEST,
@@ -97,7 +101,7 @@ static void take_down(pdcp_arb_t *arb, uint8_t node)
     pdcp_request_cancel(&arb->bus, node);
     pdcp_link_on_lost(&arb->bus, node);
     reset_ends(arb, node, PDCP_ERR_NO_ANSWER);
-    if (arb->host.active && arb->host.node == node) {
+    if (arb->host.node == node) {
         host_ends(arb, PDCP_ERR_NO_ANSWER);
     }
     if (device->beaconed) {
@@ -165,11 +169,13 @@ static void serve(pdcp_arb_t *arb, uint8_t node)
         pdcp_request_command(&arb->bus, node, PDCP_CLIENT_RESET, PDCP_RESET, 0);
         return;
     }
-    const bool paused = pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node));
-    if (device->state == PDCP_NODE_FAILED && !paused) {
+    if (pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node))) {
+        return; /* the setup pauses */
+    }
+    if (device->state == PDCP_NODE_FAILED) {
         pdcp_setup_start(&arb->bus, node);
     }
-    if (device->state == PDCP_NODE_SETUP && !paused) {
+    if (device->state == PDCP_NODE_SETUP) {
         pdcp_setup_ask(&arb->bus, node);
     }
 }
@@ -259,9 +265,7 @@ static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 static void go_silent(pdcp_arb_t *arb)
 {
     arb->silent = true;
-    if (arb->host.active) {
-        host_ends(arb, PDCP_ERR_NO_ANSWER);
-    }
+    host_ends(arb, PDCP_ERR_NO_ANSWER);
     if (pdcp_link_wish_waits(&arb->bus)) {
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
@@ -418,22 +422,14 @@ static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
     if (reply->done && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
         return;
     }
-    switch ((pdcp_client_t)reply->client) {
-    case PDCP_CLIENT_SETUP:
+    if (reply->client == PDCP_CLIENT_SETUP) {
         setup_on_reply(arb, node, reply);
-        break;
-    case PDCP_CLIENT_LINK:
+    } else if (reply->client == PDCP_CLIENT_LINK) {
         pdcp_link_on_reply(&arb->bus, reply);
-        break;
-    case PDCP_CLIENT_HOST:
-    case PDCP_CLIENT_RAW:
-        host_on_reply(arb, node, reply);
-        break;
-    case PDCP_CLIENT_RESET:
+    } else if (reply->client == PDCP_CLIENT_RESET) {
         reset_on_reply(arb, node, status);
-        break;
-    default:
-        break;
+    } else if (reply->client == PDCP_CLIENT_HOST || reply->client == PDCP_CLIENT_RAW) {
+        host_on_reply(arb, node, reply);
     }
 }
 
@@ -774,7 +770,7 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
     if (channels[output].node == channels[input].node) {
         return PDCP_ERR_OWN;
     }
-    return pdcp_link_wish(&arb->bus, output, input) ? PDCP_OK : PDCP_ERR_BUSY;
+    return pdcp_link_wish(&arb->bus, output, input);
 }
 
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)

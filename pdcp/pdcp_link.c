@@ -92,15 +92,15 @@ static void release_output(pdcp_bus_t *bus, uint8_t output)
     }
 }
 
-bool pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
+pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
 {
     if (bus->link.wish_input != PDCP_NONE) {
-        return false;
+        return PDCP_ERR_BUSY;
     }
     bus->link.wish_input = input;
     bus->link.wish_output = output;
     bus->link.due = true;
-    return true;
+    return PDCP_OK;
 }
 
 bool pdcp_link_wish_waits(const pdcp_bus_t *bus)
@@ -145,8 +145,10 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
         }
         input->feed = find_source(bus, input);
         const uint8_t source = owner_of(bus, input->feed);
-        const bool concerned = node == PDCP_NONE || input->node == node || source == node;
-        if (concerned && source != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
+        if (source == PDCP_NONE || input->todo == PDCP_TODO_UPDATE) {
+            continue;
+        }
+        if (node == PDCP_NONE || input->node == node || source == node) {
             put_todo(bus, i, PDCP_TODO_CONNECT);
         }
     }
@@ -205,11 +207,11 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &bus->nodes.channels[i];
-        const bool own = channel->node == node;
-        if (channel->link == PDCP_LINK_ACTIVE && (own || owner_of(bus, channel->feed) == node)) {
+        if (channel->link == PDCP_LINK_ACTIVE &&
+            (channel->node == node || owner_of(bus, channel->feed) == node)) {
             pdcp_link_rest(bus, i);
         }
-        if (own) { /* nothing can be written to it */
+        if (channel->node == node) { /* nothing can be written to it */
             channel->enabled = false;
             channel->todo = PDCP_TODO_NONE;
         }
@@ -267,13 +269,13 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
     if (channel != NULL) {
         take_old(bus, channel);
     }
-    if (kind == PDCP_TODO_CONNECT) {
-        bus->link.step = STEP_INPUT_OFF;
-        bus->link.undoing = false;
-        name_source(bus, channel);
-    } else if (kind == PDCP_TODO_UPDATE) {
+    if (kind == PDCP_TODO_CONNECT || kind == PDCP_TODO_UPDATE) {
         bus->link.step = STEP_READ_VID_PID;
         bus->link.undoing = false;
+    }
+    if (kind == PDCP_TODO_CONNECT) {
+        bus->link.step = STEP_INPUT_OFF;
+        name_source(bus, channel);
     }
 }
 
@@ -688,16 +690,15 @@ bool pdcp_link_is_settled(const pdcp_bus_t *bus)
     return (!bus->link.active || bus->link.kind == PDCP_TODO_AGAIN) && !has_work(bus);
 }
 
-/* Who waits for the device's place is served when a request of it ends, so that none may be broken off. */
-static bool is_waited_for(const pdcp_bus_t *bus, uint8_t node)
-{
-    return node != PDCP_NONE && (bus->nodes.nodes[node].asked_again || bus->nodes.nodes[node].reset_asked);
-}
-
-/* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. */
+/* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. But who
+ * waits for its place is served when a request of it ends, so that none may be broken off. */
 static void break_off(pdcp_bus_t *bus)
 {
     if (bus->link.at != PDCP_NONE) {
+        const pdcp_node_t *device = pdcp_bus_node(bus, bus->link.at);
+        if (device->asked_again || device->reset_asked) {
+            return;
+        }
         pdcp_request_cancel(bus, bus->link.at);
         bus->link.at = PDCP_NONE;
     }
@@ -708,8 +709,7 @@ static void break_off(pdcp_bus_t *bus)
 
 void pdcp_link_step(pdcp_bus_t *bus)
 {
-    if (bus->link.active && bus->link.kind == PDCP_TODO_AGAIN && has_work(bus) &&
-        !is_waited_for(bus, bus->link.at)) {
+    if (bus->link.active && bus->link.kind == PDCP_TODO_AGAIN && has_work(bus)) {
         break_off(bus);
     }
     run(bus);

@@ -795,14 +795,15 @@ void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
     pdcp_link_rest(&arb->bus, input);
 }
 
-void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source)
+void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
+                       uint8_t index, uint16_t type, uint16_t profile)
 {
     pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
     arb->bus.now_ms = now_ms;
-    channel->source = source->identity;
-    channel->source_index = source->index;
-    channel->source_type = source->type;
-    channel->source_profile = source->profile;
+    channel->source = *owner;
+    channel->source_index = index;
+    channel->source_type = type;
+    channel->source_profile = profile;
     channel->link = PDCP_LINK_INACTIVE;
     pdcp_bus_tell_link(&arb->bus, PDCP_EVENT_LINK, input, PDCP_OK);
 }

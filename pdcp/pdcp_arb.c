@@ -67,8 +67,12 @@ static void expect_life(pdcp_arb_t *arb, uint8_t node)
     set_life(arb, node, silence_ms(node_of(arb, node)));
 }
 
+/* The host's request, if it has one, ends. */
 static void host_ends(pdcp_arb_t *arb, pdcp_status_t status)
 {
+    if (!arb->host.active) {
+        return;
+    }
     arb->host.active = false;
     arb->host.waiting = false;
     const pdcp_event_t event = {.kind = PDCP_EVENT_REQUEST,
@@ -97,7 +101,7 @@ static void take_down(pdcp_arb_t *arb, uint8_t node)
     pdcp_request_cancel(&arb->bus, node);
     pdcp_link_on_lost(&arb->bus, node);
     reset_ends(arb, node, PDCP_ERR_NO_ANSWER);
-    if (arb->host.active && arb->host.node == node) {
+    if (arb->host.node == node) {
         host_ends(arb, PDCP_ERR_NO_ANSWER);
     }
     if (device->beaconed) {
@@ -165,11 +169,13 @@ static void serve(pdcp_arb_t *arb, uint8_t node)
         pdcp_request_command(&arb->bus, node, PDCP_CLIENT_RESET, PDCP_RESET, 0);
         return;
     }
-    const bool paused = pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node));
-    if (device->state == PDCP_NODE_FAILED && !paused) {
+    if (pdcp_timers_is_set(&arb->bus.timers, (uint8_t)(PDCP_TIMER_REQUEST + node))) {
+        return; /* the setup pauses */
+    }
+    if (device->state == PDCP_NODE_FAILED) {
         pdcp_setup_start(&arb->bus, node);
     }
-    if (device->state == PDCP_NODE_SETUP && !paused) {
+    if (device->state == PDCP_NODE_SETUP) {
         pdcp_setup_ask(&arb->bus, node);
     }
 }
@@ -205,7 +211,9 @@ static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 /* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
 static bool is_young(pdcp_arb_t *arb)
 {
-    arb->young = arb->young && pdcp_time_before(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS);
+    if (pdcp_time_reached(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS)) {
+        arb->young = false;
+    }
     return arb->young;
 }
 
@@ -257,9 +265,7 @@ static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 static void go_silent(pdcp_arb_t *arb)
 {
     arb->silent = true;
-    if (arb->host.active) {
-        host_ends(arb, PDCP_ERR_NO_ANSWER);
-    }
+    host_ends(arb, PDCP_ERR_NO_ANSWER);
     if (pdcp_link_wish_waits(&arb->bus)) {
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
@@ -346,8 +352,10 @@ static void host_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *rep
     pdcp_host_request_t *host = &arb->host;
     const uint16_t end = (uint16_t)(reply->offset + reply->len);
     const bool raw = host->client == PDCP_CLIENT_RAW;
-    const bool success =
-        reply->status == PDCP_OK && (!raw || reply->len < 2 || reply->bytes[1] == PDCP_SUCCESS);
+    bool success = reply->status == PDCP_OK;
+    if (raw && reply->len >= 2 && reply->bytes[1] != PDCP_SUCCESS) {
+        success = false;
+    }
     if (success && host->code == PDCP_SET_PARAMETER) {
         host_has_set(arb);
     }
@@ -414,22 +422,14 @@ static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
     if (reply->done && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
         return;
     }
-    switch ((pdcp_client_t)reply->client) {
-    case PDCP_CLIENT_SETUP:
+    if (reply->client == PDCP_CLIENT_SETUP) {
         setup_on_reply(arb, node, reply);
-        break;
-    case PDCP_CLIENT_LINK:
+    } else if (reply->client == PDCP_CLIENT_LINK) {
         pdcp_link_on_reply(&arb->bus, reply);
-        break;
-    case PDCP_CLIENT_HOST:
-    case PDCP_CLIENT_RAW:
-        host_on_reply(arb, node, reply);
-        break;
-    case PDCP_CLIENT_RESET:
+    } else if (reply->client == PDCP_CLIENT_RESET) {
         reset_on_reply(arb, node, status);
-        break;
-    default:
-        break;
+    } else if (reply->client == PDCP_CLIENT_HOST || reply->client == PDCP_CLIENT_RAW) {
+        host_on_reply(arb, node, reply);
     }
 }
 
@@ -449,36 +449,32 @@ static bool is_deprecated(uint8_t code)
 /* May a device send this code? All answers but those that it gets itself. */
 static bool is_from_device(uint8_t code)
 {
-    const unsigned from_arbitrator = 1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL;
+    const unsigned answers = 0xFFFFu ^ (1u << PDCP_BIND_DEVICE | 1u << PDCP_UPDATE_CHANNEL);
     const unsigned requests = 1u << PDCP_BULK_DATA | 1u << PDCP_UPDATE_CHANNEL;
-    return (code & PDCP_ANSWER) != 0 ? !is_in(from_arbitrator, code) : is_in(requests, code);
+    return is_in((code & PDCP_ANSWER) != 0 ? answers : requests, code);
 }
 
 static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
-    const uint32_t late = arb->bus.stats[PDCP_STAT_DROP_LATE];
-    pdcp_stat_t stat = PDCP_STAT_TAKEN;
     bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
     if (!replied) {
         const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
         if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
-            stat = PDCP_STAT_DROP_BAD_CODE;
+            count(arb, PDCP_STAT_DROP_BAD_CODE);
         } else if (decoded == PDCP_DECODE_BAD_DLC) {
-            stat = PDCP_STAT_DROP_BAD_DLC;
+            count(arb, PDCP_STAT_DROP_BAD_DLC);
         } else if (is_deprecated(msg.code)) {
-            stat = PDCP_STAT_DROP_DEPRECATED;
+            count(arb, PDCP_STAT_DROP_DEPRECATED);
         } else if (!is_from_device(msg.code)) {
-            stat = PDCP_STAT_DROP_DIRECTION;
+            count(arb, PDCP_STAT_DROP_DIRECTION);
         } else if (msg.code == PDCP_UPDATE_CHANNEL) {
+            count(arb, PDCP_STAT_TAKEN);
             pdcp_link_on_update(&arb->bus, node, msg.channel);
         } else {
             replied = pdcp_request_on_message(&arb->bus, node, &msg, &reply);
         }
-    }
-    if (arb->bus.stats[PDCP_STAT_DROP_LATE] == late) {
-        count(arb, stat);
     }
     if (replied) {
         on_reply(arb, node, &reply);
@@ -563,7 +559,10 @@ static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
  * has its answer in time. */
 static void limit_host_wait(pdcp_arb_t *arb)
 {
-    const bool waits = arb->host.waiting || arb->bus.link.wish_input != PDCP_NONE;
+    bool waits = arb->host.waiting;
+    if (arb->bus.link.wish_input != PDCP_NONE) {
+        waits = true;
+    }
     const bool limited = pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_HOST);
     if (waits && !limited) {
         pdcp_bus_wake(&arb->bus, PDCP_TIMER_HOST, PDCP_HOST_WAIT_MS);
@@ -633,12 +632,12 @@ void pdcp_arb_tx_pop(pdcp_arb_t *arb)
 }
 
 /* Can the device be asked? */
-static bool is_bound(const pdcp_arb_t *arb, uint8_t node)
+static bool is_bound(pdcp_arb_t *arb, uint8_t node)
 {
     if (node >= PDCP_DEVICES_MAX) {
         return false;
     }
-    const uint8_t state = arb->bus.nodes.nodes[node].state;
+    const uint8_t state = node_of(arb, node)->state;
     return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST;
 }
 
@@ -771,7 +770,7 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
     if (channels[output].node == channels[input].node) {
         return PDCP_ERR_OWN;
     }
-    return pdcp_link_wish(&arb->bus, output, input) ? PDCP_OK : PDCP_ERR_BUSY;
+    return pdcp_link_wish(&arb->bus, output, input);
 }
 
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
@@ -796,14 +795,15 @@ void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
     pdcp_link_rest(&arb->bus, input);
 }
 
-void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source)
+void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
+                       uint8_t index, uint16_t type, uint16_t profile)
 {
     pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
     arb->bus.now_ms = now_ms;
-    channel->source = source->identity;
-    channel->source_index = source->index;
-    channel->source_type = source->type;
-    channel->source_profile = source->profile;
+    channel->source = *owner;
+    channel->source_index = index;
+    channel->source_type = type;
+    channel->source_profile = profile;
     channel->link = PDCP_LINK_INACTIVE;
     pdcp_bus_tell_link(&arb->bus, PDCP_EVENT_LINK, input, PDCP_OK);
 }

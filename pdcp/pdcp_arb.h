@@ -39,14 +39,6 @@ typedef struct {
 
 #define PDCP_STRANGERS_MAX 8
 
-/* What names an output: an input's parameters 5, 6 and 8. */
-typedef struct {
-    pdcp_identity_t identity;
-    uint16_t type;
-    uint16_t profile;
-    uint8_t index;
-} pdcp_link_source_t;
-
 typedef struct {
     uint32_t asked_ms;   /* when a device asked to bind last, or the start */
     uint32_t started_ms; /* means something while young */
@@ -137,9 +129,10 @@ void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored);
  * PDCP_EVENT_LINK comes at once. */
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
 
-/* Lists a link of an input that has none as inactive, with a source that need not be there; nothing is sent.
- */
-void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_link_source_t *source);
+/* Lists a link of an input that has none as inactive, with a source that need not be there: the output with
+ * this channel index, type and profile, of the device owner. Nothing is sent. */
+void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
+                       uint8_t index, uint16_t type, uint16_t profile);
 
 /* Have all links been made or taken away that were to be? A device that does not answer may still be told to
  * be silent (D-BUS-22). */

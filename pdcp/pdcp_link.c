@@ -39,10 +39,10 @@ static uint8_t owner_of(const pdcp_bus_t *bus, uint8_t channel)
     return channel != PDCP_NONE ? bus->nodes.channels[channel].node : (uint8_t)PDCP_NONE;
 }
 
-static bool is_ready(const pdcp_bus_t *bus, uint8_t channel)
+static bool is_ready(pdcp_bus_t *bus, uint8_t channel)
 {
     const uint8_t node = owner_of(bus, channel);
-    return node != PDCP_NONE && bus->nodes.nodes[node].state == PDCP_NODE_READY;
+    return node != PDCP_NONE && pdcp_bus_node(bus, node)->state == PDCP_NODE_READY;
 }
 
 static bool is_unconnected(const pdcp_channel_t *input)
@@ -92,15 +92,15 @@ static void release_output(pdcp_bus_t *bus, uint8_t output)
     }
 }
 
-bool pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
+pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
 {
     if (bus->link.wish_input != PDCP_NONE) {
-        return false;
+        return PDCP_ERR_BUSY;
     }
     bus->link.wish_input = input;
     bus->link.wish_output = output;
     bus->link.due = true;
-    return true;
+    return PDCP_OK;
 }
 
 bool pdcp_link_wish_waits(const pdcp_bus_t *bus)
@@ -118,13 +118,13 @@ static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, bool con
     const pdcp_msg_t msg = {.code = PDCP_UPDATE_CHANNEL | PDCP_ANSWER,
                             .result = connected ? PDCP_SUCCESS : PDCP_FAILURE,
                             .channel = index};
-    (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, bus->nodes.nodes[node].node_id, &msg);
+    (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, pdcp_bus_node(bus, node)->node_id, &msg);
 }
 
 void pdcp_link_on_update(pdcp_bus_t *bus, uint8_t node, uint8_t index)
 {
     const uint8_t number = pdcp_nodes_channel(&bus->nodes, node, index);
-    const uint8_t state = bus->nodes.nodes[node].state;
+    const uint8_t state = pdcp_bus_node(bus, node)->state;
     if (state == PDCP_NODE_SETUP && number == PDCP_NONE) {
         return; /* without a channel yet: the device asks again */
     }
@@ -145,8 +145,10 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
         }
         input->feed = find_source(bus, input);
         const uint8_t source = owner_of(bus, input->feed);
-        const bool concerned = node == PDCP_NONE || input->node == node || source == node;
-        if (concerned && source != PDCP_NONE && input->todo != PDCP_TODO_UPDATE) {
+        if (source == PDCP_NONE || input->todo == PDCP_TODO_UPDATE) {
+            continue;
+        }
+        if (node == PDCP_NONE || input->node == node || source == node) {
             put_todo(bus, i, PDCP_TODO_CONNECT);
         }
     }
@@ -205,11 +207,11 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &bus->nodes.channels[i];
-        const bool own = channel->node == node;
-        if (channel->link == PDCP_LINK_ACTIVE && (own || owner_of(bus, channel->feed) == node)) {
+        if (channel->link == PDCP_LINK_ACTIVE &&
+            (channel->node == node || owner_of(bus, channel->feed) == node)) {
             pdcp_link_rest(bus, i);
         }
-        if (own) { /* nothing can be written to it */
+        if (channel->node == node) { /* nothing can be written to it */
             channel->enabled = false;
             channel->todo = PDCP_TODO_NONE;
         }
@@ -239,7 +241,7 @@ static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
 static void name_source(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     const pdcp_channel_t *output = &bus->nodes.channels[bus->link.output];
-    input->source = bus->nodes.nodes[output->node].identity;
+    input->source = pdcp_bus_node(bus, output->node)->identity;
     input->source_index = output->index;
     input->source_type = output->type;
     input->source_profile = output->profile;
@@ -267,13 +269,13 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
     if (channel != NULL) {
         take_old(bus, channel);
     }
-    if (kind == PDCP_TODO_CONNECT) {
-        bus->link.step = STEP_INPUT_OFF;
-        bus->link.undoing = false;
-        name_source(bus, channel);
-    } else if (kind == PDCP_TODO_UPDATE) {
+    if (kind == PDCP_TODO_CONNECT || kind == PDCP_TODO_UPDATE) {
         bus->link.step = STEP_READ_VID_PID;
         bus->link.undoing = false;
+    }
+    if (kind == PDCP_TODO_CONNECT) {
+        bus->link.step = STEP_INPUT_OFF;
+        name_source(bus, channel);
     }
 }
 
@@ -378,14 +380,14 @@ static void give_up(pdcp_bus_t *bus, pdcp_status_t status)
     bus->link.undoing = true;
 }
 
-/* Update Data Channel, once 5 and 6 are read: is the source that they name on the bus? False: the job is
- * over. */
-static bool resolve(pdcp_bus_t *bus)
+/* Update Data Channel, once 5 and 6 are read: the job goes on if the source that they name is on the bus. */
+static void resolve(pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = channel_of(bus, bus->link.input);
     bus->link.output = find_source(bus, input);
     if (input->link == PDCP_LINK_ACTIVE && bus->link.output == input->feed) {
-        return false;
+        end(bus);
+        return;
     }
     input->link = is_unconnected(input) ? PDCP_LINK_NONE : PDCP_LINK_INACTIVE;
     take_old(bus, input);
@@ -394,10 +396,11 @@ static bool resolve(pdcp_bus_t *bus)
             put_todo(bus, bus->link.input, PDCP_TODO_SILENCE); /* it goes on hearing the source it had */
         }
         bus->link.status = PDCP_ERR_UNKNOWN;
-        return false;
+        end(bus);
+        return;
     }
     name_source(bus, input);
-    return true;
+    bus->link.step++;
 }
 
 /* Goes on to the step that comes next in the job's direction; behind the last one the job is over. */
@@ -417,14 +420,18 @@ static void advance(pdcp_bus_t *bus)
     }
 }
 
-/* Can the current step be carried out? */
-static bool step_possible(const pdcp_bus_t *bus)
+/* Can the current step be carried out? Making a link needs its input in every step. */
+static bool step_possible(pdcp_bus_t *bus)
 {
-    if (bus->link.undoing) {
-        return is_ready(bus, target_of(bus));
+    if (bus->link.step == STEP_OUTPUT_ON || (bus->link.step == STEP_NODES && !bus->link.undoing)) {
+        if (!is_ready(bus, bus->link.output)) {
+            return false;
+        }
+        if (bus->link.undoing) {
+            return true;
+        }
     }
-    const bool needs_output = bus->link.step == STEP_NODES || bus->link.step == STEP_OUTPUT_ON;
-    return is_ready(bus, bus->link.input) && (!needs_output || is_ready(bus, bus->link.output));
+    return is_ready(bus, bus->link.input);
 }
 
 /* What the current step reads or writes: the parameter, and the value for it in bytes[]. Returns the value's
@@ -459,7 +466,7 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
         *param = PDCP_IN_SOURCE_NODES;
         len = 2;
         if (!bus->link.undoing) {
-            low = (uint16_t)(bus->nodes.nodes[output->node].node_id | (uint16_t)(output->node_id << 8));
+            low = (uint16_t)(pdcp_bus_node(bus, output->node)->node_id | (uint16_t)(output->node_id << 8));
         }
         break;
     case STEP_INPUT_OFF:
@@ -524,23 +531,13 @@ static void run(pdcp_bus_t *bus)
 
 static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
-    pdcp_channel_t *input = channel_of(bus, bus->link.input);
-    switch ((step_t)bus->link.step) {
-    case STEP_READ_VID_PID:
-    case STEP_READ_SERIAL:
-        pdcp_nodes_take_source(input, reply);
-        break;
-    case STEP_INPUT_OFF:
-        input->enabled = false;
-        break;
-    case STEP_INPUT_ON:
-        input->enabled = !bus->link.undoing;
-        break;
-    case STEP_OUTPUT_ON:
-        bus->nodes.channels[bus->link.output].enabled = !bus->link.undoing;
-        break;
-    default:
-        break;
+    pdcp_channel_t *channel = channel_of(bus, target_of(bus));
+    if (bus->link.step <= STEP_READ_SERIAL) {
+        pdcp_nodes_take_source(channel, reply);
+    } else if (bus->link.step == STEP_INPUT_OFF) {
+        channel->enabled = false;
+    } else if (bus->link.step >= STEP_INPUT_ON) {
+        channel->enabled = !bus->link.undoing;
     }
 }
 
@@ -592,8 +589,8 @@ static void on_success(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     took_effect(bus, reply);
     bus->link.once = false;
-    if (bus->link.step == STEP_READ_SERIAL && !resolve(bus)) {
-        end(bus);
+    if (bus->link.step == STEP_READ_SERIAL) {
+        resolve(bus);
     } else if (bus->link.undoing || bus->link.input != PDCP_NONE) { /* else run finds out, and gives up */
         advance(bus);
     }
@@ -601,9 +598,6 @@ static void on_success(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 
 void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
-    if (!reply->done) {
-        return;
-    }
     bus->link.at = PDCP_NONE;
     if (reply->status == PDCP_OK) {
         on_success(bus, reply);
@@ -663,15 +657,17 @@ static void start_wish(pdcp_bus_t *bus)
     bus->link.wish_input = PDCP_NONE;
 }
 
-/* The channel that is to be seen to next: what silences comes before what connects. */
-static uint8_t next_todo(const pdcp_bus_t *bus)
+/* What is to be done next, PDCP_TODO_NONE: nothing, and for which channel: what silences comes before what
+ * connects. */
+static uint8_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
 {
-    uint8_t best = PDCP_NONE;
+    uint8_t best = PDCP_TODO_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *channel = &bus->nodes.channels[i];
-        if (channel->todo != PDCP_TODO_NONE && bus->nodes.nodes[channel->node].state != PDCP_NODE_SETUP &&
-            (best == PDCP_NONE || channel->todo < bus->nodes.channels[best].todo)) {
-            best = i;
+        if (channel->todo != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || channel->todo < best) &&
+            bus->nodes.nodes[channel->node].state != PDCP_NODE_SETUP) {
+            best = channel->todo;
+            *number = i;
         }
     }
     return best;
@@ -680,9 +676,12 @@ static uint8_t next_todo(const pdcp_bus_t *bus)
 /* Is there something to be done, other than to silence again? */
 static bool has_work(const pdcp_bus_t *bus)
 {
-    const uint8_t next = bus->link.due ? next_todo(bus) : (uint8_t)PDCP_NONE;
-    return bus->link.wish_input != PDCP_NONE ||
-           (next != PDCP_NONE && bus->nodes.channels[next].todo != PDCP_TODO_AGAIN);
+    uint8_t number;
+    if (bus->link.wish_input != PDCP_NONE) {
+        return true;
+    }
+    const uint8_t todo = bus->link.due ? next_todo(bus, &number) : (uint8_t)PDCP_TODO_NONE;
+    return todo != PDCP_TODO_NONE && todo != PDCP_TODO_AGAIN;
 }
 
 bool pdcp_link_is_settled(const pdcp_bus_t *bus)
@@ -690,16 +689,15 @@ bool pdcp_link_is_settled(const pdcp_bus_t *bus)
     return (!bus->link.active || bus->link.kind == PDCP_TODO_AGAIN) && !has_work(bus);
 }
 
-/* Who waits for the device's place is served when a request of it ends, so that none may be broken off. */
-static bool is_waited_for(const pdcp_bus_t *bus, uint8_t node)
-{
-    return node != PDCP_NONE && (bus->nodes.nodes[node].asked_again || bus->nodes.nodes[node].reset_asked);
-}
-
-/* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. */
+/* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. But who
+ * waits for its place is served when a request of it ends, so that none may be broken off. */
 static void break_off(pdcp_bus_t *bus)
 {
     if (bus->link.at != PDCP_NONE) {
+        const pdcp_node_t *device = pdcp_bus_node(bus, bus->link.at);
+        if (device->asked_again || device->reset_asked) {
+            return;
+        }
         pdcp_request_cancel(bus, bus->link.at);
         bus->link.at = PDCP_NONE;
     }
@@ -710,18 +708,17 @@ static void break_off(pdcp_bus_t *bus)
 
 void pdcp_link_step(pdcp_bus_t *bus)
 {
-    if (bus->link.active && bus->link.kind == PDCP_TODO_AGAIN && has_work(bus) &&
-        !is_waited_for(bus, bus->link.at)) {
+    if (bus->link.active && bus->link.kind == PDCP_TODO_AGAIN && has_work(bus)) {
         break_off(bus);
     }
     run(bus);
     while (!bus->link.active && bus->link.due) {
-        const uint8_t next = next_todo(bus);
-        const bool urgent = next != PDCP_NONE && bus->nodes.channels[next].todo <= PDCP_TODO_REMOVE;
-        if (bus->link.wish_input != PDCP_NONE && !urgent) {
+        uint8_t number = PDCP_NONE;
+        const uint8_t todo = next_todo(bus, &number);
+        if (bus->link.wish_input != PDCP_NONE && todo != PDCP_TODO_SILENCE && todo != PDCP_TODO_REMOVE) {
             start_wish(bus);
-        } else if (next != PDCP_NONE) {
-            start_todo(bus, next);
+        } else if (todo != PDCP_TODO_NONE) {
+            start_todo(bus, number);
         } else {
             bus->link.due = false;
         }

@@ -52,8 +52,9 @@ bool pdcp_link_is_settled(const struct pdcp_bus *bus);
 /* Lets an active link rest: both ends disabled, source remembered (D-PRO-9). */
 void pdcp_link_rest(struct pdcp_bus *bus, uint8_t input);
 
-/* Asks for exactly this link. The outcome comes as PDCP_EVENT_WISH. False: another wish is under way. */
-bool pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input);
+/* Asks for exactly this link. PDCP_OK: the outcome comes as PDCP_EVENT_WISH. PDCP_ERR_BUSY: another wish is
+ * under way. */
+pdcp_status_t pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input);
 
 /* A wish that has not been started ends with status. Nothing happens when there is none. */
 void pdcp_link_forget_wish(struct pdcp_bus *bus, pdcp_status_t status);

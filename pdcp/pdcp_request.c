@@ -4,9 +4,9 @@
 
 #include "pdcp_bus.h"
 
-bool pdcp_request_is_idle(const pdcp_bus_t *bus, uint8_t node)
+bool pdcp_request_is_idle(pdcp_bus_t *bus, uint8_t node)
 {
-    return bus->nodes.nodes[node].request.state == PDCP_REQUEST_IDLE;
+    return pdcp_bus_node(bus, node)->request.state == PDCP_REQUEST_IDLE;
 }
 
 static bool is_parameter(const pdcp_request_t *request)
@@ -168,14 +168,6 @@ static bool late(pdcp_bus_t *bus)
     return false;
 }
 
-/* Does msg answer what was sent, about the same parameter and channel? 8E names none. */
-static bool is_answer(const pdcp_request_t *request, const pdcp_msg_t *msg)
-{
-    return msg->code == (code_of(request) | PDCP_ANSWER) &&
-           (request->state == PDCP_REQUEST_SET_DATA ||
-            (msg->param == request->param && msg->channel == request->channel));
-}
-
 /* What was sent has failed: the device wants a parameter by bulk, or a packet again, or it refuses. */
 static bool on_failure(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t result, pdcp_reply_t *reply)
 {
@@ -211,7 +203,7 @@ static bool on_success(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *m
     default: /* PDCP_REQUEST_ANSWER */
         return finish(bus, device, PDCP_OK, reply);
     }
-    if (request->state != PDCP_REQUEST_SET_SIZE && request->offset == request->size) {
+    if (request->offset == request->size) {
         return finish(bus, device, PDCP_OK, reply);
     }
     enter(bus, device, next);
@@ -229,15 +221,20 @@ static void answer_packet(pdcp_bus_t *bus, const pdcp_node_t *device, uint8_t re
 static bool on_packet(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     pdcp_request_t *request = &device->request;
-    const bool again = msg->packet_id == (uint8_t)(request->packet_id - 1) && request->offset != 0;
-    const bool idle_after = request->state == PDCP_REQUEST_IDLE && request->got_bulk;
-    if (request->state != PDCP_REQUEST_GET_DATA && !(idle_after && again)) {
+    const uint16_t left = (uint16_t)(request->size - request->offset);
+    bool again = false;
+    uint8_t result = PDCP_SUCCESS;
+    if (request->offset != 0 && msg->packet_id == (uint8_t)(request->packet_id - 1)) {
+        again = true;
+    } else if (msg->packet_id != request->packet_id || msg->len > left) {
+        result = PDCP_FAILURE;
+    }
+    if (request->state != PDCP_REQUEST_GET_DATA && !(again && request->got_bulk)) {
         return late(bus);
     }
-    const uint16_t left = (uint16_t)(request->size - request->offset);
-    const bool wrong = !again && (msg->packet_id != request->packet_id || msg->len > left);
-    answer_packet(bus, device, wrong ? PDCP_FAILURE : PDCP_SUCCESS);
-    if (wrong) {
+    pdcp_bus_count(bus, PDCP_STAT_TAKEN);
+    answer_packet(bus, device, result);
+    if (result != PDCP_SUCCESS) {
         reply->len = 0;
         return restart_bulk(bus, device, reply);
     }
@@ -264,22 +261,19 @@ static bool on_packet(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *ms
 bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     pdcp_node_t *device = pdcp_bus_node(bus, node);
-    reply_head(&device->request, reply, msg->value, msg->len);
+    const pdcp_request_t *request = &device->request;
+    reply_head(request, reply, msg->value, msg->len);
     if (msg->code == PDCP_BULK_DATA) {
         return on_packet(bus, device, msg, reply);
     }
-    if (!is_answer(&device->request, msg)) {
+    if (msg->code != (code_of(request) | PDCP_ANSWER) ||
+        (request->state != PDCP_REQUEST_SET_DATA && /* 8E names no parameter */
+         (msg->param != request->param || msg->channel != request->channel))) {
         return late(bus);
     }
+    pdcp_bus_count(bus, PDCP_STAT_TAKEN);
     return msg->result == PDCP_SUCCESS ? on_success(bus, device, msg, reply)
                                        : on_failure(bus, device, msg->result, reply);
-}
-
-/* Is the frame a well-formed answer about another parameter or channel than the raw request's? */
-static bool is_about_another(const pdcp_request_t *request, const can_frame_t *frame)
-{
-    return is_parameter(request) && request->size >= 3 && frame->dlc >= 4 &&
-           (frame->data[2] != request->param || frame->data[3] != request->channel);
 }
 
 bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t node, const can_frame_t *frame, pdcp_reply_t *reply)
@@ -287,9 +281,14 @@ bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t node, const can_frame_t *fra
     pdcp_node_t *device = pdcp_bus_node(bus, node);
     const pdcp_request_t *request = &device->request;
     if (request->state != PDCP_REQUEST_RAW || frame->dlc == 0 ||
-        frame->data[0] != (request->code | PDCP_ANSWER) || is_about_another(request, frame)) {
+        frame->data[0] != (request->code | PDCP_ANSWER)) {
         return false;
     }
+    if (is_parameter(request) && request->size >= 3 && frame->dlc >= 4 &&
+        (frame->data[2] != request->param || frame->data[3] != request->channel)) {
+        return false; /* well-formed, and about another parameter or channel */
+    }
+    pdcp_bus_count(bus, PDCP_STAT_TAKEN);
     reply_head(request, reply, frame->data, frame->dlc);
     return finish(bus, device, PDCP_OK, reply);
 }

@@ -62,7 +62,7 @@ typedef struct {
     uint8_t restarts_left;
     uint8_t packet_id; /* next bulk packet */
     uint8_t value[PDCP_VALUE_MAX];
-    bool got_bulk; /* idle after a bulk get: the last packet may come once more */
+    bool got_bulk; /* idle, after a bulk get: the last packet may come once more */
 } pdcp_request_t;
 
 /* What a message or a deadline has led to. */
@@ -78,7 +78,7 @@ typedef struct {
     const uint8_t *bytes; /* valid during the call only; never NULL */
 } pdcp_reply_t;
 
-bool pdcp_request_is_idle(const struct pdcp_bus *bus, uint8_t node);
+bool pdcp_request_is_idle(struct pdcp_bus *bus, uint8_t node);
 
 /* Starts a request; the device's place must be idle. size: of the value to be set in bytes[], which must stay
  * where it is until the reply when it is longer than PDCP_VALUE_MAX; of the longest value that may be got,
@@ -113,12 +113,12 @@ void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);
 /* Forgets a request without a reply. */
 void pdcp_request_cancel(struct pdcp_bus *bus, uint8_t node);
 
-/* A frame from a device. True: it answers the device's raw request, reply says how. An answer about another
- * parameter or channel, to a request before, is not taken for it. */
+/* A frame from a device. True: it answers the device's raw request, reply says how; it is counted. An answer
+ * about another parameter or channel, to a request before, is not taken for it. */
 bool pdcp_request_on_frame(struct pdcp_bus *bus, uint8_t node, const can_frame_t *frame, pdcp_reply_t *reply);
 
-/* A decoded message from a device, or the deadline of its request. True: reply says what follows. An answer
- * that belongs to no request is counted and otherwise ignored. */
+/* A decoded message from a device, which is counted, or the deadline of its request. True: reply says what
+ * follows. An answer that belongs to no request is counted as late and otherwise ignored. */
 bool pdcp_request_on_message(struct pdcp_bus *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply);
 bool pdcp_request_on_deadline(struct pdcp_bus *bus, uint8_t node, pdcp_reply_t *reply);
 

@@ -20,9 +20,9 @@ pdcp_txq_put_t pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame)
     }
     uint8_t at = txq->count;
     while (at > 0 && txq->frames[at - 1].id <= frame->id) {
-        txq->frames[at] = txq->frames[at - 1];
         at--;
     }
+    memmove(&txq->frames[at + 1], &txq->frames[at], (size_t)(txq->count - at) * sizeof txq->frames[0]);
     txq->frames[at] = *frame;
     txq->count++;
     return full ? PDCP_TXQ_PUSHED_OUT : PDCP_TXQ_TAKEN;

@@ -438,22 +438,19 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
 {
     const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
     const uint8_t entry = entry_of(run, input);
-    pdcp_link_source_t source = {.index = 0};
+    bool original = false;
     if (entry != PDCP_NONE) {
         const profile_ref_t *output = &run->links.entries[entry].output;
-        source.identity = run->links.parts[output->part].identity;
-        source.type = output->type;
-        source.profile = output->profile;
-        source.index = output->index;
+        const pdcp_identity_t *owner = &run->links.parts[output->part].identity;
+        if (channel->link == PDCP_LINK_NONE) {
+            pdcp_arb_remember(arb, now_ms, input, owner, output->index, output->type, output->profile);
+            return;
+        }
+        original = output->index == channel->source_index && pdcp_identity_equal(owner, &channel->source);
     }
     if (channel->link == PDCP_LINK_NONE) {
-        if (entry != PDCP_NONE) {
-            pdcp_arb_remember(arb, now_ms, input, &source);
-        }
         return;
     }
-    const bool original = entry != PDCP_NONE && source.index == channel->source_index &&
-                          pdcp_identity_equal(&source.identity, &channel->source);
     if (channel->link == PDCP_LINK_ACTIVE) {
         run->moves++;
         if (original) {

@@ -70,9 +70,8 @@ typedef struct {
     uint8_t source; /* where its next candidate comes from */
     uint8_t tried;  /* candidate of this source tried last, the one in the plan; PDCP_NONE: none yet */
     uint8_t mark;   /* where in the log it stands, or will */
-    uint8_t need;   /* what is seen to */
+    uint8_t need;   /* what is seen to, or that its next candidate is to be tried */
     uint8_t cursor; /* channel number of the need seen to last, PDCP_NONE: none yet */
-    bool choosing;  /* its next candidate is to be tried */
 } profile_frame_t;
 
 /* All but want, steps and left is the planner's own. */

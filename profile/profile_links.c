@@ -1,5 +1,6 @@
 #include "profile_links.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "profile_match.h"
@@ -19,17 +20,19 @@ static const pdcp_identity_t *owner_of(const profile_links_t *links, const profi
  * PDCP_NONE: there is no room. */
 static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_identity_t *owner)
 {
+    profile_part_t *unused = NULL;
     uint8_t part = PDCP_NONE;
-    const profile_part_t *at = links->parts;
+    profile_part_t *at = links->parts;
     for (uint8_t i = 0; i < PROFILE_PARTS_MAX; i++, at++) {
         if (!profile_bit(used, i)) {
             part = i;
+            unused = at;
         } else if (pdcp_identity_equal(&at->identity, owner)) {
             return i;
         }
     }
-    if (part != PDCP_NONE) {
-        links->parts[part].identity = *owner;
+    if (unused != NULL) {
+        unused->identity = *owner;
         profile_set_bit(used, part, true);
     }
     return part;
@@ -37,8 +40,9 @@ static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_ident
 
 static void put_end(profile_links_t *links, profile_ref_t *ref, uint8_t part, const profile_end_t *end)
 {
-    links->parts[part].type = end->owner_type;
-    links->parts[part].profile = end->owner_profile;
+    profile_part_t *owner = &links->parts[part];
+    owner->type = end->owner_type;
+    owner->profile = end->owner_profile;
     ref->type = end->type;
     ref->profile = end->profile;
     ref->part = part;
@@ -79,7 +83,8 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
     }
     if (old != PDCP_NONE) {
         profile_links_remove(links, old);
-    } else if (links->count == PROFILE_LINKS_MAX) {
+    }
+    if (links->count == PROFILE_LINKS_MAX) {
         return false;
     }
     profile_entry_t *entry = insert(links, &link->input);

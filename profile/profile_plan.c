@@ -76,10 +76,10 @@ bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
         return false;
     }
     const pdcp_node_t *node = &scene->nodes->nodes[place];
-    if (node->state == PDCP_NODE_SETUP) {
-        return !node->setup_again;
+    if (node->state == PDCP_NODE_LOST) {
+        return profile_bit(scene->awaited, place);
     }
-    return node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place);
+    return node->state == PDCP_NODE_SETUP && !node->setup_again;
 }
 
 /* --- Ends of the configuration --- */
@@ -111,8 +111,10 @@ static void look_at_ends(profile_plan_t *plan)
 static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t entry)
 {
     const uint8_t output = plan->want[input];
-    return output != PDCP_NONE &&
-           profile_links_name(plan->links, plan->nodes, &entry_at(plan, entry)->output, output);
+    if (output == PDCP_NONE) {
+        return false;
+    }
+    return profile_links_name(plan->links, plan->nodes, &entry_at(plan, entry)->output, output);
 }
 
 /* --- Links of the plan --- */
@@ -256,7 +258,7 @@ static uint8_t search(profile_plan_t *plan, uint8_t partner, const profile_ref_t
             }
         }
         plan->left--;
-        plan->search_at++;
+        plan->search_at = (uint8_t)(c + 1u);
         if (plan->search_at == PDCP_CHANNELS_MAX) {
             plan->search_at = 0;
             return plan->best;
@@ -473,7 +475,10 @@ static bool is_lacking(profile_plan_t *plan, uint8_t input)
         return false;
     }
     const uint8_t original = original_of(plan, input);
-    return original == PDCP_NONE || !entry_at(plan, original)->by_host;
+    if (original == PDCP_NONE) {
+        return true;
+    }
+    return !entry_at(plan, original)->by_host;
 }
 
 /* Goes to the next entry or input of a phase. True: it was the last one, from the first one again. */
@@ -552,10 +557,10 @@ static bool stands_in(profile_plan_t *plan, uint8_t input)
 /* Inputs that do not stand in any more. */
 static void forget_stand_ins(profile_plan_t *plan)
 {
-    for (uint8_t e = 0; e < plan->links->count; e++) {
-        const uint8_t input = plan->stand_in[e];
-        if (input != PDCP_NONE && !hears_output_of(plan, input, e)) {
-            plan->stand_in[e] = PDCP_NONE;
+    uint8_t *stand_in = plan->stand_in;
+    for (uint8_t e = 0; e < plan->links->count; e++, stand_in++) {
+        if (*stand_in != PDCP_NONE && !hears_output_of(plan, *stand_in, e)) {
+            *stand_in = PDCP_NONE;
         }
     }
     plan->left -= EFFORT_SCAN;
@@ -1001,15 +1006,18 @@ static void do_phase(profile_plan_t *plan)
     }
 }
 
-/* Which devices are set up: a bit per place. */
-static void note_ready(const profile_scene_t *scene, uint8_t ready[PROFILE_PLACE_BYTES])
+bool profile_plan_is_stale(profile_plan_t *plan, const profile_scene_t *scene)
 {
-    memset(ready, 0, PROFILE_PLACE_BYTES);
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (scene->nodes->nodes[i].state == PDCP_NODE_READY) {
-            profile_set_bit(ready, i, true);
+    const pdcp_node_t *node = scene->nodes->nodes;
+    bool stale = false;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++, node++) {
+        const bool ready = node->state == PDCP_NODE_READY;
+        if (ready != profile_bit(plan->ready, i)) {
+            profile_set_bit(plan->ready, i, ready);
+            stale = true;
         }
     }
+    return stale;
 }
 
 void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint8_t what)
@@ -1017,7 +1025,7 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
     memset(plan, 0, sizeof *plan);
     memset(plan->want, PDCP_NONE, sizeof plan->want);
     plan->what = what | ALWAYS;
-    note_ready(scene, plan->ready);
+    (void)profile_plan_is_stale(plan, scene); /* notes which devices are set up */
     for (uint8_t e = 0; e < scene->links->count; e++) {
         plan->stand_in[e] = scene->links->entries[e].stand_in;
     }
@@ -1042,13 +1050,6 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
     return plan->phase == PHASE_DONE;
 }
 
-bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene)
-{
-    uint8_t ready[PROFILE_PLACE_BYTES];
-    note_ready(scene, ready);
-    return memcmp(ready, plan->ready, sizeof ready) != 0;
-}
-
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)
 {
     return hash_links(NULL, scene) != plan->base;
@@ -1059,8 +1060,9 @@ bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8
     if (!profile_is_sole(&nodes->channels[input])) {
         return false;
     }
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(&nodes->channels[i])) {
+    const pdcp_channel_t *channel = nodes->channels;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
+        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(channel)) {
             return true;
         }
     }

@@ -130,8 +130,9 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
  * True: the plan is done. */
 bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16_t effort);
 
-/* Has a device come or gone since the plan was begun? */
-bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene);
+/* Has a device come or gone since the plan was begun, or this was asked? Then the plan is to be begun anew.
+ */
+bool profile_plan_is_stale(profile_plan_t *plan, const profile_scene_t *scene);
 
 /* Do other links work than those that the plan was begun with? */
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene);

@@ -1,5 +1,6 @@
 #include "profile_links.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "profile_match.h"
@@ -19,16 +20,19 @@ static const pdcp_identity_t *owner_of(const profile_links_t *links, const profi
  * PDCP_NONE: there is no room. */
 static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_identity_t *owner)
 {
+    profile_part_t *unused = NULL;
     uint8_t part = PDCP_NONE;
-    for (uint8_t i = 0; i < PROFILE_PARTS_MAX; i++) {
+    profile_part_t *at = links->parts;
+    for (uint8_t i = 0; i < PROFILE_PARTS_MAX; i++, at++) {
         if (!profile_bit(used, i)) {
             part = i;
-        } else if (pdcp_identity_equal(&links->parts[i].identity, owner)) {
+            unused = at;
+        } else if (pdcp_identity_equal(&at->identity, owner)) {
             return i;
         }
     }
-    if (part != PDCP_NONE) {
-        links->parts[part].identity = *owner;
+    if (unused != NULL) {
+        unused->identity = *owner;
         profile_set_bit(used, part, true);
     }
     return part;
@@ -36,8 +40,9 @@ static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_ident
 
 static void put_end(profile_links_t *links, profile_ref_t *ref, uint8_t part, const profile_end_t *end)
 {
-    links->parts[part].type = end->owner_type;
-    links->parts[part].profile = end->owner_profile;
+    profile_part_t *owner = &links->parts[part];
+    owner->type = end->owner_type;
+    owner->profile = end->owner_profile;
     ref->type = end->type;
     ref->profile = end->profile;
     ref->part = part;
@@ -62,10 +67,11 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
     uint8_t used[(PROFILE_PARTS_MAX + 7) / 8]; /* but for the entry that goes */
     const uint8_t old = profile_links_find(links, &link->input.owner, link->input.index);
     memset(used, 0, sizeof used);
-    for (uint8_t i = 0; i < links->count; i++) {
+    const profile_entry_t *at = links->entries;
+    for (uint8_t i = 0; i < links->count; i++, at++) {
         if (i != old) {
-            profile_set_bit(used, links->entries[i].output.part, true);
-            profile_set_bit(used, links->entries[i].input.part, true);
+            profile_set_bit(used, at->output.part, true);
+            profile_set_bit(used, at->input.part, true);
         }
     }
     /* If only the second end finds no part, the first one got that of its device in the old entry, or one
@@ -77,7 +83,8 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
     }
     if (old != PDCP_NONE) {
         profile_links_remove(links, old);
-    } else if (links->count == PROFILE_LINKS_MAX) {
+    }
+    if (links->count == PROFILE_LINKS_MAX) {
         return false;
     }
     profile_entry_t *entry = insert(links, &link->input);
@@ -90,9 +97,9 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
 
 void profile_links_remove(profile_links_t *links, uint8_t entry)
 {
+    profile_entry_t *gone = &links->entries[entry];
     links->count--;
-    memmove(&links->entries[entry], &links->entries[entry + 1],
-            (size_t)(links->count - entry) * sizeof links->entries[0]);
+    memmove(gone, gone + 1, (size_t)(links->count - entry) * sizeof *gone);
 }
 
 /* Does an end name the channel with this owner and index? */
@@ -104,8 +111,8 @@ static bool names(const profile_links_t *links, const profile_ref_t *end, const 
 
 bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t *link)
 {
-    for (uint8_t i = 0; i < links->count; i++) {
-        const profile_entry_t *entry = &links->entries[i];
+    const profile_entry_t *entry = links->entries;
+    for (uint8_t i = 0; i < links->count; i++, entry++) {
         if ((link->input.type & entry->input.type & PROFILE_TYPE_SOLE) != 0 &&
             names(links, &entry->output, &link->output.owner, link->output.index) &&
             !names(links, &entry->input, &link->input.owner, link->input.index)) {
@@ -117,8 +124,9 @@ bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t
 
 uint8_t profile_links_find(const profile_links_t *links, const pdcp_identity_t *owner, uint8_t index)
 {
-    for (uint8_t i = 0; i < links->count; i++) {
-        if (names(links, &links->entries[i].input, owner, index)) {
+    const profile_entry_t *entry = links->entries;
+    for (uint8_t i = 0; i < links->count; i++, entry++) {
+        if (names(links, &entry->input, owner, index)) {
             return i;
         }
     }
@@ -144,8 +152,9 @@ static void get_end(const profile_links_t *links, const profile_ref_t *ref, prof
 
 void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link_t *link)
 {
-    get_end(links, &links->entries[entry].output, &link->output);
-    get_end(links, &links->entries[entry].input, &link->input);
+    const profile_entry_t *from = &links->entries[entry];
+    get_end(links, &from->output, &link->output);
+    get_end(links, &from->input, &link->input);
 }
 
 bool profile_links_name(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end,
@@ -194,8 +203,9 @@ bool profile_source_of(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *
     end->owner_type = 0;
     end->owner_profile = 0;
     if (place != PDCP_NONE) {
-        end->owner_type = nodes->nodes[place].type;
-        end->owner_profile = nodes->nodes[place].profile;
+        const pdcp_node_t *owner = &nodes->nodes[place];
+        end->owner_type = owner->type;
+        end->owner_profile = owner->profile;
     }
     end->type = entry->source_type;
     end->profile = entry->source_profile;

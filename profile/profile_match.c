@@ -93,5 +93,9 @@ bool profile_bit(const uint8_t *bits, uint8_t number)
 void profile_set_bit(uint8_t *bits, uint8_t number, bool value)
 {
     const uint8_t mask = (uint8_t)(1u << (number % 8));
-    bits[number / 8] = (uint8_t)(value ? bits[number / 8] | mask : bits[number / 8] & ~mask);
+    uint8_t *byte = &bits[number / 8];
+    *byte |= mask;
+    if (!value) {
+        *byte ^= mask;
+    }
 }

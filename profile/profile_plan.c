@@ -13,8 +13,15 @@ typedef enum {
     SOURCE_SIMILAR      /* the most similar to the input itself */
 } source_t;
 
-/* What a new link needs, in this order. */
-typedef enum { NEED_BY_OUTPUT, NEED_BY_INPUT, DESIRED_BY_OUTPUT, DESIRED_BY_INPUT, NEEDS_END } need_t;
+/* What a new link needs, in this order; with no more needs it holds. Before, its output is chosen. */
+typedef enum {
+    NEED_BY_OUTPUT,
+    NEED_BY_INPUT,
+    DESIRED_BY_OUTPUT,
+    DESIRED_BY_INPUT,
+    NEEDS_END,
+    CHOOSING = NEEDS_END
+} need_t;
 
 /* Where a plan is at. Each phase does one unit of its work at a time. */
 typedef enum {
@@ -69,10 +76,10 @@ bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
         return false;
     }
     const pdcp_node_t *node = &scene->nodes->nodes[place];
-    if (node->state == PDCP_NODE_SETUP) {
-        return !node->setup_again;
+    if (node->state == PDCP_NODE_LOST) {
+        return profile_bit(scene->awaited, place);
     }
-    return node->state == PDCP_NODE_LOST && profile_bit(scene->awaited, place);
+    return node->state == PDCP_NODE_SETUP && !node->setup_again;
 }
 
 /* --- Ends of the configuration --- */
@@ -104,19 +111,22 @@ static void look_at_ends(profile_plan_t *plan)
 static bool hears_output_of(const profile_plan_t *plan, uint8_t input, uint8_t entry)
 {
     const uint8_t output = plan->want[input];
-    return output != PDCP_NONE &&
-           profile_links_name(plan->links, plan->nodes, &entry_at(plan, entry)->output, output);
+    if (output == PDCP_NONE) {
+        return false;
+    }
+    return profile_links_name(plan->links, plan->nodes, &entry_at(plan, entry)->output, output);
 }
 
 /* --- Links of the plan --- */
 
 /* Another input that wants the output for itself and has it, if this one wants it for itself; PDCP_NONE:
  * there is none. */
-static uint8_t rival_of(const profile_plan_t *plan, uint8_t input, uint8_t output)
+static uint8_t rival_of(profile_plan_t *plan, uint8_t input, uint8_t output)
 {
     if (output == PDCP_NONE || !profile_is_sole(channel_of(plan, input))) {
         return PDCP_NONE;
     }
+    plan->left -= EFFORT_SCAN;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         if (plan->want[i] == output && i != input && profile_is_sole(channel_of(plan, i))) {
             return i;
@@ -136,11 +146,8 @@ static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
     if (!profile_is_sole(channel_of(plan, input))) {
         return;
     }
-    if (old != PDCP_NONE) {
-        plan->left -= EFFORT_SCAN;
-        if (rival_of(plan, input, old) == PDCP_NONE) {
-            profile_set_bit(plan->taken, old, false);
-        }
+    if (old != PDCP_NONE && rival_of(plan, input, old) == PDCP_NONE) {
+        profile_set_bit(plan->taken, old, false);
     }
     if (output != PDCP_NONE) {
         profile_set_bit(plan->taken, output, true);
@@ -157,8 +164,11 @@ static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
             return false;
         }
     }
-    return channel_of(plan, output)->node != channel_of(plan, input)->node &&
-           !(profile_bit(plan->taken, output) && profile_is_sole(channel_of(plan, input)));
+    const pdcp_channel_t *to = channel_of(plan, input);
+    if (profile_is_sole(to) && profile_bit(plan->taken, output)) {
+        return false;
+    }
+    return channel_of(plan, output)->node != to->node;
 }
 
 /* --- Searches --- */
@@ -185,7 +195,7 @@ static bool is_candidate(profile_plan_t *plan, uint8_t partner, uint8_t channel)
     if (partner == PDCP_NONE) {
         return profile_is_terminal(channel_of(plan, channel));
     }
-    return may_link(plan, partner, channel) && is_spare(plan, channel);
+    return is_spare(plan, channel) && may_link(plan, partner, channel);
 }
 
 /* Channels are searched in the order of their likeness to an end, terminal ones (NULL) in that in which they
@@ -248,7 +258,7 @@ static uint8_t search(profile_plan_t *plan, uint8_t partner, const profile_ref_t
             }
         }
         plan->left--;
-        plan->search_at++;
+        plan->search_at = (uint8_t)(c + 1u);
         if (plan->search_at == PDCP_CHANNELS_MAX) {
             plan->search_at = 0;
             return plan->best;
@@ -266,8 +276,9 @@ static uint8_t next_source(profile_plan_t *plan)
         return PDCP_NONE; /* its source will be back in a moment */
     }
     if (top->source == SOURCE_SIMILAR) {
-        const profile_ref_t like = {.type = channel_of(plan, top->input)->type,
-                                    .profile = channel_of(plan, top->input)->profile};
+        profile_ref_t like;
+        like.type = channel_of(plan, top->input)->type;
+        like.profile = channel_of(plan, top->input)->profile;
         return search(plan, top->input, &like, top->tried);
     }
     uint8_t output = plan->output;
@@ -296,7 +307,7 @@ static void push(profile_plan_t *plan, uint8_t input, source_t first)
     plan->top.source = (uint8_t)first;
     plan->top.tried = PDCP_NONE;
     plan->top.mark = plan->logged;
-    plan->top.choosing = true;
+    plan->top.need = CHOOSING;
 }
 
 /* Where the bits of a frame stand in its byte. */
@@ -336,7 +347,6 @@ static void ascend(profile_plan_t *plan)
     top->tried = plan->want[top->input];
     top->source = (uint8_t)(kept >> 2 & 3u);
     top->need = kept & 3u;
-    top->choosing = false;
 }
 
 static void undo_to(profile_plan_t *plan, uint8_t mark)
@@ -351,10 +361,11 @@ static bool is_connected(const profile_plan_t *plan, uint8_t input)
     return plan->want[input] != PDCP_NONE && !(plan->finding && profile_bit(plan->of.bits.gone, input));
 }
 
-/* The next unconnected input, behind the last one (PDCP_NONE: the first one), that a channel requires or
- * desires; PDCP_NONE: there are no more. */
-static uint8_t next_need(profile_plan_t *plan, uint8_t by, bool desired, uint8_t last)
+/* The next unconnected input, behind the last one (PDCP_NONE: the first one), that the link of an input
+ * needs; PDCP_NONE: there are no more. */
+static uint8_t next_need(profile_plan_t *plan, uint8_t input, uint8_t need, uint8_t last)
 {
+    const uint8_t by = need % 2 == NEED_BY_OUTPUT ? plan->want[input] : input;
     const pdcp_node_t *owner = &plan->nodes->nodes[channel_of(plan, by)->node];
     if (owner->needs_stride == 0) {
         return PDCP_NONE;
@@ -363,7 +374,8 @@ static uint8_t next_need(profile_plan_t *plan, uint8_t by, bool desired, uint8_t
     while (c != PDCP_NONE) {
         const pdcp_channel_t *channel = channel_of(plan, c);
         plan->left--;
-        if (!is_connected(plan, c) && pdcp_nodes_needs(plan->nodes, by, desired, channel->index)) {
+        if (!is_connected(plan, c) &&
+            pdcp_nodes_needs(plan->nodes, by, need >= DESIRED_BY_OUTPUT, channel->index)) {
             break;
         }
         c = channel->next;
@@ -375,7 +387,7 @@ static uint8_t next_need(profile_plan_t *plan, uint8_t by, bool desired, uint8_t
 static void reject(profile_plan_t *plan)
 {
     undo_to(plan, plan->top.mark);
-    plan->top.choosing = true;
+    plan->top.need = CHOOSING;
 }
 
 /* A link that can be undone. */
@@ -395,7 +407,6 @@ static void choose(profile_plan_t *plan)
     }
     top->tried = output;
     if (output != PDCP_NONE) {
-        top->choosing = false;
         top->need = NEED_BY_OUTPUT;
         top->cursor = PDCP_NONE;
         link_input(plan, top->input, output);
@@ -404,7 +415,7 @@ static void choose(profile_plan_t *plan)
     } else {
         ascend(plan);
         if (top->need < DESIRED_BY_OUTPUT) {
-            reject(plan); /* of the last frame nothing is left to be undone */
+            reject(plan); /* what it required cannot be had */
         }
     }
 }
@@ -413,12 +424,11 @@ static void choose(profile_plan_t *plan)
 static void advance(profile_plan_t *plan)
 {
     profile_frame_t *top = &plan->top;
-    if (top->choosing) {
+    if (top->need == CHOOSING) {
         choose(plan);
         return;
     }
-    top->cursor = next_need(plan, top->need % 2 == NEED_BY_OUTPUT ? top->tried : top->input,
-                            top->need >= DESIRED_BY_OUTPUT, top->cursor);
+    top->cursor = next_need(plan, top->input, top->need, top->cursor);
     if (top->cursor == PDCP_NONE) {
         top->need++;
         if (top->need == NEEDS_END) {
@@ -431,17 +441,17 @@ static void advance(profile_plan_t *plan)
     }
 }
 
-/* Connects an input and all that its link requires, and of what it desires as much as can be. Loops end: an
- * input that is being connected counts as connected. If it cannot be, nothing has changed when the phase goes
- * on. */
-static void connect(profile_plan_t *plan, uint8_t input, source_t source)
+/* Connects the phase's input and all that its link requires, and of what it desires as much as can be. Loops
+ * end: an input that is being connected counts as connected. If it cannot be, nothing has changed when the
+ * phase goes on. */
+static void connect(profile_plan_t *plan, source_t source)
 {
     plan->connecting = true;
     plan->depth = 0;
     plan->logged = 0;
     plan->needs_last = SOURCE_SIMILAR;
     begin_search(plan);
-    push(plan, input, source);
+    push(plan, plan->input, source);
 }
 
 /* --- What links require --- */
@@ -460,12 +470,15 @@ static bool is_lacking(profile_plan_t *plan, uint8_t input)
     if (!is_connected(plan, input)) {
         return false;
     }
-    if (next_need(plan, plan->want[input], false, PDCP_NONE) == PDCP_NONE &&
-        next_need(plan, input, false, PDCP_NONE) == PDCP_NONE) {
+    if (next_need(plan, input, NEED_BY_OUTPUT, PDCP_NONE) == PDCP_NONE &&
+        next_need(plan, input, NEED_BY_INPUT, PDCP_NONE) == PDCP_NONE) {
         return false;
     }
     const uint8_t original = original_of(plan, input);
-    return original == PDCP_NONE || !entry_at(plan, original)->by_host;
+    if (original == PDCP_NONE) {
+        return true;
+    }
+    return !entry_at(plan, original)->by_host;
 }
 
 /* Goes to the next entry or input of a phase. True: it was the last one, from the first one again. */
@@ -509,9 +522,9 @@ static void find_next(profile_plan_t *plan)
     }
     plan->input_at++;
     if (plan->input_at == PDCP_CHANNELS_MAX) {
+        plan->input_at = 0;
         plan->finding = plan->changed;
         plan->changed = false;
-        plan->input_at = 0;
     }
 }
 
@@ -544,10 +557,10 @@ static bool stands_in(profile_plan_t *plan, uint8_t input)
 /* Inputs that do not stand in any more. */
 static void forget_stand_ins(profile_plan_t *plan)
 {
-    for (uint8_t e = 0; e < plan->links->count; e++) {
-        const uint8_t input = plan->stand_in[e];
-        if (input != PDCP_NONE && !hears_output_of(plan, input, e)) {
-            plan->stand_in[e] = PDCP_NONE;
+    uint8_t *stand_in = plan->stand_in;
+    for (uint8_t e = 0; e < plan->links->count; e++, stand_in++) {
+        if (*stand_in != PDCP_NONE && !hears_output_of(plan, *stand_in, e)) {
+            *stand_in = PDCP_NONE;
         }
     }
     plan->left -= EFFORT_SCAN;
@@ -619,7 +632,7 @@ static void take_for_original(profile_plan_t *plan)
 {
     memcpy(plan->of.bits.lacking, plan->of.bits.gone, sizeof plan->of.bits.lacking);
     set_replaced(plan, PDCP_NONE, PDCP_NONE);
-    connect(plan, plan->input, SOURCE_GIVEN);
+    connect(plan, SOURCE_GIVEN);
     if (!profile_is_terminal(channel_of(plan, plan->input))) {
         plan->needs_last = SOURCE_ORIGINAL;
     }
@@ -635,11 +648,12 @@ static void link_original(profile_plan_t *plan)
         link_input(plan, input, plan->output);
     }
     plan->phase = PHASE_ORIGINAL_JUDGE;
-    plan->spoilt = false;
-    if (plan->want[input] == PDCP_NONE) {
-        plan->spoilt = true;
-    } else if (plan->costs) {
-        find_gone(plan);
+    plan->spoilt = true;
+    if (plan->want[input] != PDCP_NONE) {
+        plan->spoilt = false;
+        if (plan->costs) {
+            find_gone(plan);
+        }
     }
 }
 
@@ -736,7 +750,7 @@ static void repair(profile_plan_t *plan)
         return;
     }
     if (plan->input != PDCP_NONE) {
-        connect(plan, plan->input, SOURCE_REPLACEMENT);
+        connect(plan, SOURCE_REPLACEMENT);
         return;
     }
     begin_search(plan);
@@ -753,7 +767,7 @@ static void try_input(profile_plan_t *plan)
     if (input != PDCP_NONE) {
         plan->input = input;
         plan->phase = PHASE_REPAIR_LINK;
-        connect(plan, input, SOURCE_GIVEN);
+        connect(plan, SOURCE_GIVEN);
     }
 }
 
@@ -811,7 +825,7 @@ static void autoconfigure(profile_plan_t *plan)
     if (input == PDCP_NONE) {
         go_on(plan, PHASE_AUTO);
     } else if (plan->want[input] == PDCP_NONE && !(plan->waits && entry_of(plan, input) != PDCP_NONE)) {
-        connect(plan, input, SOURCE_SIMILAR);
+        connect(plan, SOURCE_SIMILAR);
     }
 }
 
@@ -878,10 +892,11 @@ static void settle(profile_plan_t *plan)
         plan->changed = true;
     }
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
-        if (!plan->changed) {
+        if (plan->changed) {
+            plan->changed = false;
+        } else {
             go_on(plan, PHASE_SETTLE);
         }
-        plan->changed = false;
     }
 }
 
@@ -904,7 +919,6 @@ static void end_round(profile_plan_t *plan)
 static void enforce(profile_plan_t *plan)
 {
     const uint8_t rival = rival_of(plan, plan->at, plan->want[plan->at]);
-    plan->left -= EFFORT_SCAN;
     if (rival != PDCP_NONE) {
         const uint8_t last = profile_is_before(plan->nodes, rival, plan->at) ? plan->at : rival;
         set_source(plan, last, PDCP_NONE);
@@ -940,7 +954,7 @@ static void finish(profile_plan_t *plan)
 /* A unit of the phase that the plan is at. */
 static void do_phase(profile_plan_t *plan)
 {
-    switch (plan->phase) {
+    switch ((phase_t)plan->phase) {
     case PHASE_LOOK:
         look(plan);
         break;
@@ -992,15 +1006,18 @@ static void do_phase(profile_plan_t *plan)
     }
 }
 
-/* Which devices are set up: a bit per place. */
-static void note_ready(const profile_scene_t *scene, uint8_t ready[PROFILE_PLACE_BYTES])
+bool profile_plan_is_stale(profile_plan_t *plan, const profile_scene_t *scene)
 {
-    memset(ready, 0, PROFILE_PLACE_BYTES);
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (scene->nodes->nodes[i].state == PDCP_NODE_READY) {
-            profile_set_bit(ready, i, true);
+    const pdcp_node_t *node = scene->nodes->nodes;
+    bool stale = false;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++, node++) {
+        const bool ready = node->state == PDCP_NODE_READY;
+        if (ready != profile_bit(plan->ready, i)) {
+            profile_set_bit(plan->ready, i, ready);
+            stale = true;
         }
     }
+    return stale;
 }
 
 void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint8_t what)
@@ -1008,7 +1025,7 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
     memset(plan, 0, sizeof *plan);
     memset(plan->want, PDCP_NONE, sizeof plan->want);
     plan->what = what | ALWAYS;
-    note_ready(scene, plan->ready);
+    (void)profile_plan_is_stale(plan, scene); /* notes which devices are set up */
     for (uint8_t e = 0; e < scene->links->count; e++) {
         plan->stand_in[e] = scene->links->entries[e].stand_in;
     }
@@ -1033,13 +1050,6 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
     return plan->phase == PHASE_DONE;
 }
 
-bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene)
-{
-    uint8_t ready[PROFILE_PLACE_BYTES];
-    note_ready(scene, ready);
-    return memcmp(ready, plan->ready, sizeof ready) != 0;
-}
-
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)
 {
     return hash_links(NULL, scene) != plan->base;
@@ -1050,8 +1060,9 @@ bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8
     if (!profile_is_sole(&nodes->channels[input])) {
         return false;
     }
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(&nodes->channels[i])) {
+    const pdcp_channel_t *channel = nodes->channels;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
+        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(channel)) {
             return true;
         }
     }

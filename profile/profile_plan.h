@@ -69,9 +69,8 @@ typedef struct {
     uint8_t source; /* where its next candidate comes from */
     uint8_t tried;  /* candidate of this source tried last, the one in the plan; PDCP_NONE: none yet */
     uint8_t mark;   /* where in the log it stands, or will */
-    uint8_t need;   /* what is seen to */
+    uint8_t need;   /* what is seen to, or that its next candidate is to be tried */
     uint8_t cursor; /* channel number of the need seen to last, PDCP_NONE: none yet */
-    bool choosing;  /* its next candidate is to be tried */
 } profile_frame_t;
 
 /* All but want, steps and left is the planner's own. */
@@ -130,8 +129,9 @@ void profile_plan_begin(profile_plan_t *plan, const profile_scene_t *scene, uint
  * True: the plan is done. */
 bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16_t effort);
 
-/* Has a device come or gone since the plan was begun? */
-bool profile_plan_is_stale(const profile_plan_t *plan, const profile_scene_t *scene);
+/* Has a device come or gone since the plan was begun, or this was asked? Then the plan is to be begun anew.
+ */
+bool profile_plan_is_stale(profile_plan_t *plan, const profile_scene_t *scene);
 
 /* Do other links work than those that the plan was begun with? */
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene);

@@ -190,7 +190,7 @@ static void test_what_fits_is_what_the_guide_says(void)
     TEST_ASSERT_EQUAL_INT(ARB_CONFIG_ERR_STORAGE, save(1, (uint8_t)(most + 1), 2));
 }
 
-/* All at their largest, each in both of its copies, over and over again. */
+/* D-MCU-6: all at their largest, each in both of its copies, over and over again. */
 static void test_memory_never_gets_too_full(void)
 {
     fill();

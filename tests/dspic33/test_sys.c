@@ -89,7 +89,7 @@ static void restart_by_a_trap(void)
 }
 
 /* INTCON1: oscillator, stack, address, arithmetic, DMA; an interrupt that nobody handles. */
-static void test_every_trap_is_written_down_and_restarts(void)
+static void test_every_trap_is_written_down_and_restarts(void) /* D-MCU-7 */
 {
     static const uint16_t flags[] = {0x0002, 0x0004, 0x0008, 0x0010, 0x0020, 0x0000};
     for (uint16_t i = 0; i < sizeof flags / sizeof flags[0]; i++) {

@@ -257,7 +257,7 @@ int accepts(const uint8_t *bytes, uint16_t len)
     return profile_tlv_read(&reader, bytes, len) == PROFILE_TLV_DONE;
 }
 """)
-    parts = [source, *(ROOT / name for name in ("profile/profile_tlv.c", "pdcp/pdcp_codec.c"))]
+    parts = [source, *ROOT.glob("profile/*.c"), *ROOT.glob("pdcp/*.c")]
     library = folder / "accepts.so"
     includes = [f"-I{ROOT / 'profile'}", f"-I{ROOT / 'pdcp'}"]
     subprocess.run(["cc", "-std=c99", "-shared", "-fPIC", *includes, *parts, "-o", library], check=True)

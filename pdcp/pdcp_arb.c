@@ -588,6 +588,14 @@ static void on_request_deadline(pdcp_arb_t *arb, uint8_t node)
     serve(arb, node);
 }
 
+/* Without a bus what waits is stale when there is one again; requests repeat themselves, and an answer to
+ * what has been given up long ago would be taken for that to a newer one. */
+static void discard_queue(pdcp_arb_t *arb)
+{
+    arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
+    pdcp_txq_init(&arb->bus.txq);
+}
+
 static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 {
     if (timer == PDCP_TIMER_BEACON) {
@@ -597,6 +605,7 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
     } else if (timer == PDCP_TIMER_HOST) {
         on_host_deadline(arb);
     } else if (timer == PDCP_TIMER_RECOVERY) {
+        discard_queue(arb);
         arb->restart = true;
     } else if (timer >= PDCP_TIMER_LIFE) {
         on_life_deadline(arb, (uint8_t)(timer - PDCP_TIMER_LIFE));
@@ -741,14 +750,15 @@ void pdcp_arb_on_state(pdcp_arb_t *arb, uint32_t now_ms, pdcp_bus_state_t state)
         return;
     }
     arb->bus.now_ms = now_ms;
+    const bool was_away = arb->recovery.state >= (uint8_t)PDCP_BUS_OFF;
     const uint16_t pause_ms = pdcp_recovery_on_state(&arb->recovery, now_ms, state);
     pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_RECOVERY);
     if (pause_ms != 0) {
         count(arb, PDCP_STAT_BUS_OFF);
-        arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
-        pdcp_txq_init(
-            &arb->bus.txq); /* when the bus is back they would be stale; requests repeat themselves */
         pdcp_bus_wake(&arb->bus, PDCP_TIMER_RECOVERY, pause_ms);
+    }
+    if (was_away || pause_ms != 0) {
+        discard_queue(arb);
     }
     pdcp_bus_tell(&arb->bus, PDCP_EVENT_STATE, PDCP_NONE, (pdcp_status_t)state);
 }

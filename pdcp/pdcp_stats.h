@@ -42,7 +42,7 @@ typedef enum {
     PDCP_STAT_STRANGER_RESET, /* Reset Device sent to an id that is not bound (D-BUS-15) */
     PDCP_STAT_TAKEN,          /* frames for the arbitrator that it has made use of */
     PDCP_STAT_DROP_SILENT,    /* everything but foreign beacons while on standby (D-BUS-12) */
-    PDCP_STAT_TX_DISCARDED,   /* frames that waited when the bus went off */
+    PDCP_STAT_TX_DISCARDED,   /* frames that waited while the bus was off */
     PDCP_STAT_BUS_OFF,        /* times that the controller went off the bus */
     PDCP_STAT_COUNT
 } pdcp_stat_t;

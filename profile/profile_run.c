@@ -591,7 +591,7 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
         const uint32_t start_ms = quiet_ms(run, arb);
         return pdcp_time_before(now_ms, start_ms) ? start_ms : now_ms + PDCP_TIME_FAR_MS;
     }
-    if (run->making != PROFILE_NOT_MAKING) {
+    if (run->making != PROFILE_NOT_MAKING && !run->wishing) {
         return now_ms;
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);

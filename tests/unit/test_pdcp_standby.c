@@ -242,6 +242,30 @@ static void test_a_bus_that_was_well_for_long_starts_from_100_ms(void)
     TEST_ASSERT_EQUAL(PDCP_BUS_ACTIVE, exchange_last(&x, PDCP_EVENT_STATE)->status);
 }
 
+/* What is queued while there is no bus is stale when there is one again: a device would do what has been
+ * given up since, and its answer would be taken for another's. */
+static void test_what_waits_without_a_bus_is_discarded(void)
+{
+    static const pdcp_bus_state_t away[] = {PDCP_BUS_OFF, PDCP_BUS_DOWN};
+    for (unsigned i = 0; i < sizeof away / sizeof away[0]; i++) {
+        pdcp_arb_on_state(x.arb, x.now_ms, away[i]);
+        const uint32_t before = stat_of(PDCP_STAT_TX_DISCARDED);
+        exchange_wait(&x, 90);
+        TEST_ASSERT_TRUE(pdcp_arb_broadcast(x.arb, PDCP_RELEASE, 0));
+        pdcp_arb_on_state(x.arb, x.now_ms, PDCP_BUS_ACTIVE);
+        TEST_ASSERT_GREATER_THAN(before, stat_of(PDCP_STAT_TX_DISCARDED));
+        exchange_silence(&x);
+        exchange_wait(&x, 10000);
+        (void)exchange_drain(&x);
+    }
+    pdcp_arb_on_state(x.arb, x.now_ms, PDCP_BUS_OFF);
+    exchange_wait(&x, 99);
+    TEST_ASSERT_TRUE(pdcp_arb_broadcast(x.arb, PDCP_RELEASE, 0));
+    exchange_wait(&x, 1);
+    TEST_ASSERT_TRUE(pdcp_arb_take_restart(x.arb));
+    exchange_silence(&x); /* the controller may send at once */
+}
+
 /* The end of a standby, where all that is known of the bus is forgotten, is no reason to stay off it. */
 static void test_bus_off_is_left_over_the_end_of_a_standby(void)
 {
@@ -292,6 +316,7 @@ int main(void)
     RUN_TEST(test_a_link_that_was_not_answered_is_tried_again);
     RUN_TEST(test_bus_off_is_left_with_a_growing_pause);
     RUN_TEST(test_a_bus_that_was_well_for_long_starts_from_100_ms);
+    RUN_TEST(test_what_waits_without_a_bus_is_discarded);
     RUN_TEST(test_bus_off_is_left_over_the_end_of_a_standby);
     RUN_TEST(test_a_full_queue_delays_nothing_urgent);
     return UNITY_END();

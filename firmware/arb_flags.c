@@ -58,6 +58,7 @@ static bool write_record(arb_flags_t *flags, const arb_nvm_t *nvm)
 void arb_flags_step(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms)
 {
     if (is_idle(flags)) {
+        arb_nvm_give(nvm, ARB_NVM_FLAGS); /* they may have been set back while it was not ready */
         return;
     }
     const int8_t status = arb_nvm_poll(nvm, ARB_NVM_FLAGS, &flags->due_ms, now_ms);

@@ -203,7 +203,7 @@ void PART_HANDLER _MI2C1Interrupt(void)
     if ((I2C1STAT & STAT_BCL) != 0) {
         I2C1STAT = 0;
         i2c1.state = COLLIDED;
-    } else {
+    } else if (i2c1.state != COLLIDED) { /* only i2c1_status ends that */
         i2c1.state = next_step((i2c1_state_t)i2c1.state);
     }
 }

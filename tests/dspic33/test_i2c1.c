@@ -4,6 +4,7 @@
 
 #include "clock.h"
 #include "fake.h"
+#include "handlers.h"
 #include "i2c1.h"
 #include "unity.h"
 
@@ -97,6 +98,20 @@ static void test_collision_ends_the_transfer(void)
     TEST_ASSERT_EQUAL_INT(I2C1_DONE, finish());
 }
 
+/* The result of the transfer before is not that of the one that has collided. */
+static void test_handler_that_runs_after_a_collision_does_not_end_it(void)
+{
+    TEST_ASSERT_TRUE(i2c1_start(EXPANDER, NULL, 0, NULL, 0));
+    TEST_ASSERT_EQUAL_INT(I2C1_DONE, finish());
+    fake.i2c_collides = true;
+    TEST_ASSERT_TRUE(i2c1_start(EXPANDER, NULL, 0, NULL, 0));
+    fake_run_us(100);
+    _MI2C1Interrupt();
+    TEST_ASSERT_EQUAL_INT(I2C1_FAILED, finish());
+    TEST_ASSERT_TRUE(i2c1_start(EXPANDER, NULL, 0, NULL, 0));
+    TEST_ASSERT_EQUAL_INT(I2C1_DONE, finish());
+}
+
 static void test_bus_that_hangs_is_recovered_after_30_ms(void)
 {
     fake.i2c_hangs = true;
@@ -156,6 +171,7 @@ int main(void)
     RUN_TEST(test_bytes_out_then_in);
     RUN_TEST(test_nobody_answers);
     RUN_TEST(test_collision_ends_the_transfer);
+    RUN_TEST(test_handler_that_runs_after_a_collision_does_not_end_it);
     RUN_TEST(test_bus_that_hangs_is_recovered_after_30_ms);
     RUN_TEST(test_device_that_drives_the_bus_in_between_is_clocked_free);
     RUN_TEST(test_device_that_drives_the_bus_at_the_start_is_clocked_free);

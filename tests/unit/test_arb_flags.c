@@ -249,6 +249,19 @@ static void test_another_owner_is_waited_for(void)
     TEST_ASSERT_EQUAL(1, writes);
 }
 
+/* Set and set back while another one's page is being written: whoever waits for the memory gets it. */
+static void test_there_and_back_while_the_memory_is_not_ready_gives_it_up(void)
+{
+    busy = 1;
+    arb_flags_set(&flags, 0x01, now_ms);
+    arb_flags_step(&flags, &nvm, now_ms);
+    arb_flags_set(&flags, ARB_FLAGS_FACTORY, now_ms);
+    TEST_ASSERT_TRUE(idle());
+    arb_flags_step(&flags, &nvm, now_ms);
+    TEST_ASSERT_TRUE(arb_nvm_take(&nvm, ARB_NVM_STORE));
+    TEST_ASSERT_EQUAL(0, writes);
+}
+
 /* The usual check value of CRC-32. */
 static void test_crc32(void)
 {
@@ -276,6 +289,7 @@ int main(void)
     RUN_TEST(test_bit_rot);
     RUN_TEST(test_a_longer_record_is_read);
     RUN_TEST(test_another_owner_is_waited_for);
+    RUN_TEST(test_there_and_back_while_the_memory_is_not_ready_gives_it_up);
     RUN_TEST(test_crc32);
     RUN_TEST(test_the_state_is_small);
     return UNITY_END();

@@ -244,7 +244,7 @@ static void test_a_bus_that_was_well_for_long_starts_from_100_ms(void)
 
 /* What is queued while there is no bus is stale when there is one again: a device would do what has been
  * given up since, and its answer would be taken for another's. */
-static void test_what_waits_without_a_bus_is_discarded(void)
+static void test_what_waits_without_a_bus_is_discarded(void) /* D-BUS-28 */
 {
     static const pdcp_bus_state_t away[] = {PDCP_BUS_OFF, PDCP_BUS_DOWN};
     for (unsigned i = 0; i < sizeof away / sizeof away[0]; i++) {

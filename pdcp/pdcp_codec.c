@@ -65,7 +65,7 @@ static const layout_t *layout_of(uint8_t code)
 
 static uint16_t get_u16(const uint8_t *bytes)
 {
-    return (uint16_t)(bytes[0] | (uint16_t)(bytes[1] << 8));
+    return (uint16_t)(bytes[0] | (uint16_t)((uint16_t)bytes[1] << 8));
 }
 
 /* Takes the fields out of the data behind the function code. */

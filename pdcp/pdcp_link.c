@@ -466,7 +466,8 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
         *param = PDCP_IN_SOURCE_NODES;
         len = 2;
         if (!bus->link.undoing) {
-            low = (uint16_t)(pdcp_bus_node(bus, output->node)->node_id | (uint16_t)(output->node_id << 8));
+            low = (uint16_t)(pdcp_bus_node(bus, output->node)->node_id |
+                             (uint16_t)((uint16_t)output->node_id << 8));
         }
         break;
     case STEP_INPUT_OFF:

@@ -94,8 +94,7 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
     if (!app->work && pdcp_time_before(now_ms, app->next_ms)) {
         return app->next_ms;
     }
-    const arb_hostenv_t env = {
-        .arb = &app->arb, .limb = &app->limb, .nvm = &app->nvm, .store = &app->store, .port = app->nvm.port};
+    const arb_hostenv_t env = {.arb = &app->arb, .limb = &app->limb, .nvm = &app->nvm, .store = &app->store};
     uint32_t next_ms;
     bool again;
     do {

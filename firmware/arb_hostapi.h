@@ -39,9 +39,8 @@ enum {
 typedef struct {
     pdcp_arb_t *arb;
     arb_limb_t *limb;
-    arb_nvm_t *nvm;
+    arb_nvm_t *nvm; /* and its port */
     const arb_store_t *store;
-    const arb_port_t *port;
 } arb_hostenv_t;
 
 /* How far the request at the front has come, when it cannot be answered at once. */

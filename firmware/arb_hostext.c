@@ -68,10 +68,7 @@ static uint8_t error_of_config(arb_call_t *call, int8_t status)
     if (status == ARB_CONFIG_ERR_BUSY) { /* a plan reads or saves */
         return arb_call_wait(call, ARB_HOST_NOT_READY_MS) ? ARB_PENDING : ARB_ERR_BUSY;
     }
-    if (status == ARB_CONFIG_ERR_VALUE) {
-        return ARB_ERR_VALUE;
-    }
-    return status >= 0 ? ARB_OK : ARB_ERR_STORAGE;
+    return arb_limb_error((arb_config_status_t)status);
 }
 
 /* 240Ah: offset, length. Read in pieces, a step each: the bus goes on between them. */
@@ -166,7 +163,7 @@ static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count
 
 static void put_driver_counters(arb_call_t *call)
 {
-    const arb_port_t *port = call->env->port;
+    const arb_port_t *port = call->env->nvm->port;
     for (uint8_t i = 0; i < (uint8_t)ARB_PORT_COUNTERS; i++) {
         put_counter(call, port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0);
     }

@@ -103,7 +103,7 @@ static void end(arb_limb_t *limb, uint8_t error)
     limb->error = error;
 }
 
-static uint8_t error_of(arb_config_status_t status)
+uint8_t arb_limb_error(arb_config_status_t status)
 {
     switch (status) {
     case ARB_CONFIG_OK:
@@ -126,7 +126,7 @@ static uint8_t started(arb_limb_t *limb, stage_t stage, arb_config_status_t stat
     if (status == ARB_CONFIG_OK) {
         limb->stage = (uint8_t)stage;
     }
-    return error_of(status);
+    return arb_limb_error(status);
 }
 
 /* --- Reading what is stored --- */
@@ -257,7 +257,7 @@ static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
         pdcp_arb_plan_links(arb, true);
         set_active(limb, limb->number);
     }
-    end(limb, error_of((arb_config_status_t)limb->status));
+    end(limb, arb_limb_error((arb_config_status_t)limb->status));
 }
 
 static uint8_t begin_load(arb_limb_t *limb)
@@ -309,7 +309,7 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
             forget_active(limb, arb);
         }
     }
-    end(limb, error_of((arb_config_status_t)limb->status));
+    end(limb, arb_limb_error((arb_config_status_t)limb->status));
 }
 
 /* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come.

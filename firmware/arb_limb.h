@@ -76,6 +76,9 @@ bool arb_limb_is_starting(const arb_limb_t *limb);
  * such action; ARB_ERR_BUSY, try again. */
 uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument);
 
+/* What the host is told of a status of arb_config (D-API-4). */
+uint8_t arb_limb_error(arb_config_status_t status);
+
 /* True, once, when the action has ended: error is ARB_OK or an error, result what 2408h says. */
 bool arb_limb_take_outcome(arb_limb_t *limb, uint8_t *error, uint16_t *result);
 

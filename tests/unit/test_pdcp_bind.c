@@ -150,14 +150,20 @@ static void test_the_oldest_identity_is_forgotten_first(void)
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_IDENTITIES));
 }
 
-static void test_a_full_bus_refuses_with_id_0(void)
+/* As many devices as there are places bind, with the ids from first on. */
+static void fill_the_bus(unsigned first)
 {
     for (unsigned i = 0; i < PDCP_DEVICES_MAX; i++) {
         char request[40];
-        (void)snprintf(request, sizeof request, "6%02X#01 0100 0100 %02X00", i + 1, i + 1);
+        (void)snprintf(request, sizeof request, "6%02X#01 0100 0100 %02X00", first + i, i + 1);
         exchange_rx(&x, request);
         (void)exchange_drain(&x);
     }
+}
+
+static void test_a_full_bus_refuses_with_id_0(void)
+{
+    fill_the_bus(1);
     exchange_rx(&x, "6C0#01 0900 0900 0900");
     exchange_tx(&x, "3C0#81 00 0900 0900 0900");
     TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_BIND_REFUSED));
@@ -169,12 +175,7 @@ static void test_a_refused_device_keeps_its_reservation(void)
 {
     exchange_rx(&x, "600#01 0900 0900 0900");
     exchange_tx(&x, "300#81 01 0900 0900 0900");
-    for (unsigned i = 0; i < PDCP_DEVICES_MAX; i++) {
-        char request[40];
-        (void)snprintf(request, sizeof request, "6%02X#01 0100 0100 %02X00", i + 2, i + 1);
-        exchange_rx(&x, request);
-        (void)exchange_drain(&x);
-    }
+    fill_the_bus(2);
     exchange_rx(&x, "6C0#01 0900 0900 0900");
     exchange_tx(&x, "3C0#81 00 0900 0900 0900");
     pdcp_nodes_remove(&x.arb->bus.nodes, 31); /* it had 0x21 */

@@ -32,16 +32,16 @@ def _write(path: str, data: bytes) -> None:
         raise UsageFault(f"{path}: {error.strerror}") from error
 
 
-def _encoded(path: str) -> bytes:
-    """The byte string of a YAML file, checked as an arbitrator checks it."""
+def _encoded(path: str) -> tuple[bytes, int]:
+    """The byte string of a YAML file, checked as an arbitrator checks it, and how many configurations it holds."""
     try:
         data = from_yaml(_read(path).decode("utf-8"))
-        parse(data)
+        count = len(parse(data))
     except UnicodeDecodeError as error:
         raise UsageFault(f"{path}: byte {error.start}: no UTF-8") from error
     except TlvError as error:
         raise UsageFault(f"{path}: {error}") from error
-    return data
+    return data, count
 
 
 def export(ctx: typer.Context, out: OutArgument = "-") -> None:
@@ -57,10 +57,9 @@ def import_(
     as_json: JsonOption = False,
 ) -> None:
     """Store the configurations of a YAML file in the arbitrator, in place of those that it has."""
-    data = _encoded(file)
+    data, count = _encoded(file)
     with connect(ctx) as client, waiting("writing configurations") as step, about(file):
         client.write_configurations(data, step)
-    count = len(parse(data))
     text = f"{count} {'configuration' if count == 1 else 'configurations'} stored, {len(data)} bytes"
     show(ctx, as_json, {"stored_configurations": count, "bytes": len(data)}, text)
 
@@ -85,7 +84,7 @@ def encode(
     out: OutArgument = "-",
 ) -> None:
     """Turn YAML into the byte string that an arbitrator stores."""
-    _write(out, _encoded(file))
+    _write(out, _encoded(file)[0])
 
 
 def register(app: typer.Typer) -> None:

@@ -158,7 +158,7 @@ static void serve(pdcp_arb_t *arb, uint8_t node)
     }
     if (device->asked_again) {
         pdcp_request_get(&arb->bus, node, PDCP_CLIENT_BIND, 0, PDCP_DEV_VID_PID, PDCP_VALUE_MAX);
-        pdcp_request_try_once(&arb->bus, node);
+        pdcp_request_limit_tries(&arb->bus, node, PDCP_CHECK_TRIES);
         return;
     }
     if (arb->host.waiting && arb->host.node == node) {
@@ -482,6 +482,25 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
     }
 }
 
+/* A frame from a bound id whose identity asks again: whatever it says, its owner is alive (D-BUS-41). */
+static bool on_frame_in_check(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
+{
+    const pdcp_node_t *device = node_of(arb, node);
+    if (is_beacon(frame)) {
+        (void)on_beacon(arb, node);
+    } else {
+        on_message(arb, node, frame);
+    }
+    if (device->asked_again) { /* the frame was no answer to the request under way */
+        if (device->request.client == PDCP_CLIENT_BIND) {
+            pdcp_request_cancel(&arb->bus, node);
+        }
+        (void)conclude_check(arb, node, PDCP_OK);
+        serve(arb, node);
+    }
+    return true;
+}
+
 bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
 {
     arb->bus.now_ms = now_ms;
@@ -507,10 +526,14 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
     if (node >= PDCP_DEVICES_MAX) {
         return on_stranger(arb, frame);
     }
-    node_of(arb, node)->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
+    pdcp_node_t *device = node_of(arb, node);
+    device->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     if (!is_device) {
         count(arb, PDCP_STAT_CHANNEL_DATA);
         return false;
+    }
+    if (device->asked_again) {
+        return on_frame_in_check(arb, node, frame);
     }
     if (is_beacon(frame)) {
         return on_beacon(arb, node); /* by far the most frequent: without decoding */

@@ -504,7 +504,7 @@ static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
     }
     pdcp_request_set(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
     if (bus->link.once) {
-        pdcp_request_try_once(bus, channel->node);
+        pdcp_request_limit_tries(bus, channel->node, 1);
     }
     return true;
 }

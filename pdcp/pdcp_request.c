@@ -119,9 +119,9 @@ void pdcp_request_start(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uin
     enter(bus, device, PDCP_REQUEST_ANSWER);
 }
 
-void pdcp_request_try_once(pdcp_bus_t *bus, uint8_t node)
+void pdcp_request_limit_tries(pdcp_bus_t *bus, uint8_t node, uint8_t tries)
 {
-    pdcp_bus_node(bus, node)->request.tries_left = 0;
+    pdcp_bus_node(bus, node)->request.tries_left = (uint8_t)(tries - 1u);
 }
 
 void pdcp_request_cancel(pdcp_bus_t *bus, uint8_t node)

@@ -107,8 +107,8 @@ static inline void pdcp_request_command(struct pdcp_bus *bus, uint8_t node, pdcp
     pdcp_request_start(bus, node, client, code, 0, 0, NULL, time_ms);
 }
 
-/* Lets the request that is under way be sent no more than this once. */
-void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);
+/* Limits the request that was just started to so many tries, 1 to PDCP_TRIES. */
+void pdcp_request_limit_tries(struct pdcp_bus *bus, uint8_t node, uint8_t tries);
 
 /* Forgets a request without a reply. */
 void pdcp_request_cancel(struct pdcp_bus *bus, uint8_t node);

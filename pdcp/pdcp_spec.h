@@ -84,6 +84,7 @@ enum {
     PDCP_ACK_MIN_MS = 20,           /* D-BUS-13 */
     PDCP_ACK_MAX_MS = 500,          /* D-BUS-13 */
     PDCP_TRIES = 3,                 /* a request and two repetitions */
+    PDCP_CHECK_TRIES = 2,           /* of the question whether a bound identity is still there (D-BUS-41) */
     PDCP_BEACON_MS = 500,           /* both ways (D-BUS-11, D-BUS-13) */
     PDCP_BEACON_MIN_MS = 50,        /* D-BUS-13 */
     PDCP_BEACON_MAX_MS = 10000,     /* D-BUS-13 */

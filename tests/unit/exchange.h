@@ -71,6 +71,10 @@ void exchange_add_input(exchange_t *x);
  * enabled to the output. */
 extern const exchange_pair_t exchange_making[];
 
+/* The device with this node id (two hexadecimal digits) is asked who it is, in vain: the check of its
+ * identity (D-BUS-41). */
+void exchange_check_fails(exchange_t *x, const char *node_id);
+
 /* The beacon of these devices, so that they stay alive. */
 void exchange_beacons(exchange_t *x);
 

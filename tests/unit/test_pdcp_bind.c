@@ -205,12 +205,14 @@ static void test_a_second_device_with_the_same_identity_is_refused(void)
     TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
 }
 
-/* D-BUS-6: one try without an answer means that it was reset: granted again and set up afresh. */
+/* D-BUS-6, D-BUS-41: two tries without an answer mean that it was reset: granted again and set up afresh. */
 static void test_a_device_that_was_reset_is_granted_again(void)
 {
     exchange_add_output(&x, "FE");
     exchange_clear(&x);
     exchange_rx(&x, "611#01 0200 0200 0400");
+    exchange_tx(&x, "311#03 01 00");
+    exchange_pass(&x, 100);
     exchange_tx(&x, "311#03 01 00");
     exchange_pass(&x, 99);
     exchange_silence(&x);
@@ -228,9 +230,30 @@ static void test_a_device_that_was_reset_and_asks_for_another_id_gets_its_own_su
 {
     exchange_add_output(&x, "FE");
     exchange_rx(&x, "699#01 0200 0200 0400");
-    exchange_tx(&x, "311#03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "11");
     exchange_tx(&x, "399#81 11 0200 0200 0400");
+}
+
+/* D-BUS-41: any frame of priority 0 to 2 from the bound id shows that its owner is alive; one of its output
+ * does not. */
+static void test_any_frame_from_its_id_answers_for_a_device(void)
+{
+    static const char *const frames[] = {"011#0A", "211#0F 01", "411#55", "211#84 01 04 01"};
+    exchange_add_output(&x, "FE");
+    for (unsigned i = 0; i < sizeof frames / sizeof frames[0]; i++) {
+        exchange_rx(&x, "620#01 0200 0200 0400");
+        exchange_tx(&x, "311#03 01 00");
+        exchange_rx(&x, "0FE#11 22");
+        exchange_silence(&x);
+        exchange_rx(&x, frames[i]);
+        if (frames[i][4] == '0' && frames[i][5] == 'F') {
+            exchange_tx(&x, "311#8F 00 01"); /* by identifier */
+        }
+        exchange_tx(&x, "320#81 00 0200 0200 0400");
+        exchange_silence(&x);
+    }
+    TEST_ASSERT_EQUAL(4, stat_of(PDCP_STAT_BIND_DUPLICATE));
+    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
 }
 
 /* The grant was lost on the way: the device asks again while the arbitrator tries to set it up. */
@@ -280,6 +303,7 @@ int main(void)
     RUN_TEST(test_a_second_device_with_the_same_identity_is_refused);
     RUN_TEST(test_a_device_that_was_reset_is_granted_again);
     RUN_TEST(test_a_device_that_was_reset_and_asks_for_another_id_gets_its_own_suggested);
+    RUN_TEST(test_any_frame_from_its_id_answers_for_a_device);
     RUN_TEST(test_a_lost_grant_is_repeated);
     RUN_TEST(test_what_is_no_bind_request_is_counted);
     return UNITY_END();

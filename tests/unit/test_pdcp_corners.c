@@ -429,11 +429,11 @@ static void test_a_transfer_answers_for_its_device(void)
     exchange_silence(&x);
     from(0x11, "0E 00 000000000000");
     to(0x11, "8E 01");
-    exchange_silence(&x);
+    is_told(0x20, 0, 4);
     from(0x11, "0E 01 0000");
     to(0x11, "8E 01");
     to(0x11, "03 0A 01");
-    is_told(0x20, 0, 4);
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_BIND_DUPLICATE]);
     TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, x.arb->bus.nodes.nodes[0].state);
 }
@@ -734,8 +734,7 @@ static void test_no_link_with_a_device_in_its_setup(void)
     add_two();
     add(0x13, 9, "i", 0);
     asks_for(0x12, 6);
-    to(0x12, "03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "12");
     is_told(0x12, 0x12, 6);
     to(0x12, "03 01 00");
     wish(0, 1);
@@ -747,6 +746,11 @@ static void test_no_link_with_a_device_in_its_setup(void)
     from(0x12, "83 01 01 00 0200 0200");
     to(0x12, "03 02 00");
     exchange_pass(&x, 1);
+    to(0x11, "03 01 00");
+    exchange_pass(&x, 98);
+    from(0x12, "83 01 02 00 0600");
+    to(0x12, "03 06 00");
+    exchange_pass(&x, 2);
     is_told(0x11, 0x11, 4);
     to(0x11, "03 01 00");
     wish(0, 2);
@@ -1105,8 +1109,7 @@ static void test_a_link_outlives_a_failed_setup(void)
     exchange_silence(&x);
     beacon(0x11);
     asks_for(0x12, 6);
-    to(0x12, "03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "12");
     is_told(0x12, 0x12, 6);
     set_up(0x12, 6, "i", 0);
     link_input(0x12, 4, 0x11, 0xFE);

@@ -53,9 +53,12 @@ static void test_the_input_vanishes_at_the_last_step(void)
     connect_to_the_last_step();
     exchange_rx(&x, "612#01 0200 0200 0600");
     exchange_tx(&x, "312#03 01 00");
+    exchange_pass(&x, 100);
+    exchange_tx(&x, "311#04 04 01 01");
+    exchange_tx(&x, "312#03 01 00");
     exchange_pass(&x, 99);
     exchange_rx(&x, "011#0A");
-    exchange_pass(&x, 1); /* the check of 12h and the second try to 11h */
+    exchange_pass(&x, 1); /* the check of 12h and the third try to 11h */
     exchange_tx(&x, "311#04 04 01 01");
     exchange_tx(&x, "312#81 12 0200 0200 0600");
     exchange_tx(&x, "312#03 01 00");
@@ -105,6 +108,9 @@ static void test_a_waiting_wish_ends_with_its_device(void)
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
     exchange_rx(&x, "611#01 0200 0200 0400");
     exchange_tx(&x, "311#03 01 00");
+    exchange_pass(&x, 100);
+    exchange_tx(&x, "311#03 01 00");
+    exchange_tx(&x, "312#04 05 01 0200 0200"); /* the job's second try */
     exchange_pass(&x, 100);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
     TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
@@ -244,8 +250,7 @@ static void test_an_update_that_could_not_be_read_is_not_refused(void)
 static void test_a_reset_device_is_checked_once(void)
 {
     exchange_rx(&x, "655#01 0200 0200 0400");
-    exchange_tx(&x, "311#03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "11");
     exchange_tx(&x, "355#81 11 0200 0200 0400");
     exchange_rx(&x, "611#01 0200 0200 0400");
     exchange_tx(&x, "311#81 11 0200 0200 0400");
@@ -371,6 +376,9 @@ static void test_a_removal_outlasts_the_source(void)
     TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
     exchange_rx(&x, "611#01 0200 0200 0400"); /* the source's device was reset */
     exchange_tx(&x, "311#03 01 00");
+    exchange_pass(&x, 100);
+    exchange_tx(&x, "311#03 01 00");
+    exchange_tx(&x, "312#03 05 01"); /* once more */
     exchange_pass(&x, 99);
     exchange_rx(&x, "212#83 01 05 01 0200 0200");
     exchange_tx(&x, "312#03 06 01");

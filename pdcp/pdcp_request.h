@@ -43,6 +43,8 @@ typedef enum {
     PDCP_REQUEST_GET_DATA, /* waiting for the device's next 0E */
     PDCP_REQUEST_SET_SIZE, /* 0D sent, waiting for 8D */
     PDCP_REQUEST_SET_DATA, /* 0E sent, waiting for 8E */
+    PDCP_REQUEST_SET_ECHO, /* 8E came, but 0E was sent more than once: waiting for its other answers
+                              (D-BUS-39) */
     PDCP_REQUEST_RAW,      /* a frame of the host sent, waiting for its answer */
     PDCP_REQUEST_STATES
 } pdcp_request_state_t;
@@ -58,7 +60,7 @@ typedef struct {
     uint8_t code;         /* function code of the request */
     uint8_t param;
     uint8_t channel;
-    uint8_t tries_left;
+    uint8_t tries_left; /* PDCP_REQUEST_SET_ECHO: answers that may still come */
     uint8_t restarts_left;
     uint8_t packet_id; /* next bulk packet */
     uint8_t value[PDCP_VALUE_MAX];

@@ -35,6 +35,6 @@
 #define PDCP_PARAMETER_MAX 512
 
 /* RAM budget of the whole application, on a target with 16-bit int and pointers. */
-#define ARB_RAM_BUDGET 11264
+#define ARB_RAM_BUDGET 12032
 
 #endif

@@ -16,10 +16,8 @@ static void forget_bus(pdcp_arb_t *arb)
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->bus);
     memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
-    memset(arb->strangers, 0, sizeof arb->strangers);
     arb->asked_ms = arb->bus.now_ms;
-    arb->started_ms = arb->bus.now_ms;
-    arb->young = true;
+    arb->bus.started_ms = arb->bus.now_ms;
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
 }
 
@@ -30,6 +28,7 @@ void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event
     arb->bus.on_event = on_event;
     arb->bus.event_ctx = ctx;
     arb->spread_ms = (uint16_t)(serial % PDCP_STANDBY_SPREAD_MS);
+    pdcp_unknown_init(&arb->bus.unknown, now_ms);
     forget_bus(arb);
 }
 
@@ -208,42 +207,17 @@ static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
     }
 }
 
-/* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
-static bool is_young(pdcp_arb_t *arb)
+static bool is_young(const pdcp_arb_t *arb)
 {
-    if (pdcp_time_reached(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS)) {
-        arb->young = false;
-    }
-    return arb->young;
+    return pdcp_bus_age_ms(&arb->bus) < PDCP_YOUNG_MS;
 }
 
-static void forget_strangers(pdcp_arb_t *arb)
-{
-    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (pdcp_time_reached(arb->bus.now_ms, arb->strangers[i].until_ms)) {
-            arb->strangers[i].node_id = 0;
-        }
-    }
-}
-
-/* Tells the device with this id to reset, at most once a second (D-BUS-15). It will then bind. */
+/* Tells the device with this id to reset, at most once a second (D-BUS-15, D-BUS-37). It will then bind. */
 static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
 {
-    pdcp_stranger_t *entry = NULL;
-    forget_strangers(arb);
-    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (arb->strangers[i].node_id == id) {
-            return;
-        }
-        if (arb->strangers[i].node_id == 0) {
-            entry = &arb->strangers[i];
-        }
+    if (!pdcp_unknown_tell(&arb->bus.unknown, arb->bus.now_ms, id)) {
+        return;
     }
-    if (entry == NULL) {
-        return; /* its turn comes within a second: nobody is told twice */
-    }
-    entry->node_id = id;
-    entry->until_ms = arb->bus.now_ms + PDCP_STRANGER_PAUSE_MS;
     if (send(arb, PDCP_PRIORITY_NORMAL, id, PDCP_RESET, 0)) {
         count(arb, PDCP_STAT_STRANGER_RESET);
     }
@@ -254,7 +228,11 @@ static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
     count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (!is_beacon(frame) || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb)) {
+    if (id < PDCP_NODE_MIN || id > PDCP_NODE_MAX) {
+        return false;
+    }
+    pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+    if (!is_beacon(frame) || is_young(arb)) {
         return false;
     }
     reset_stranger(arb, id);
@@ -552,8 +530,8 @@ static void send_beacon(pdcp_arb_t *arb)
  */
 static void on_beacon_deadline(pdcp_arb_t *arb)
 {
-    (void)is_young(arb);
-    forget_strangers(arb);
+    arb->bus.started_ms = arb->bus.now_ms - pdcp_bus_age_ms(&arb->bus); /* a longer difference would wrap */
+    pdcp_unknown_on_time(&arb->bus.unknown, arb->bus.now_ms);
     pdcp_bind_on_time(&arb->bus);
     if (arb->silent) {
         arb->silent = false;

@@ -31,19 +31,9 @@ typedef struct {
     uint16_t len;   /* got so far */
 } pdcp_host_request_t;
 
-/* An id that is not bound and was told to reset (D-BUS-15). */
-typedef struct {
-    uint8_t node_id;
-    uint32_t until_ms;
-} pdcp_stranger_t;
-
-#define PDCP_STRANGERS_MAX 8
-
 typedef struct {
     uint32_t asked_ms;   /* when a device asked to bind last, or the start */
-    uint32_t started_ms; /* means something while young */
     uint32_t foreign_ms; /* when another arbitrator was heard last */
-    bool young;          /* in its first PDCP_YOUNG_MS */
     bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */
     bool silent;         /* on standby (D-BUS-12) */
     bool restart;        /* the controller is to be restarted */
@@ -51,7 +41,6 @@ typedef struct {
     pdcp_bus_t bus;
     pdcp_recovery_t recovery;
     uint16_t spread_ms; /* of the standby, from the serial number */
-    pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
 } pdcp_arb_t;
 
 /* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).

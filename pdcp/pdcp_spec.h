@@ -101,9 +101,9 @@ enum {
     PDCP_STANDBY_SPREAD_MS = 1000,  /* by serial number (D-BUS-12) */
     PDCP_RECOVERY_MS = 100,         /* first pause before leaving bus-off, doubling */
     PDCP_RECOVERY_MAX_MS = 5000,
-    PDCP_YOUNG_MS = 1200,         /* first time of an arbitrator: no Reset to strangers (D-BUS-15), and silent
-                                     when another is heard (D-BUS-12) */
-    PDCP_STRANGER_PAUSE_MS = 1000 /* between two Resets to the same id (D-BUS-15) */
+    PDCP_YOUNG_MS = 1200,   /* first time of an arbitrator: no Reset to strangers (D-BUS-15), and silent
+                               when another is heard (D-BUS-12) */
+    PDCP_AGE_MAX_MS = 20000 /* longer than any time that is counted from the start */
 };
 
 /* VID, PID and serial number: who a device is [PDCP 3.2.1]. */

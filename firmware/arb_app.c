@@ -26,7 +26,7 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
 {
     memset(app, 0, sizeof *app);
     app->work = true;
-    pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
+    pdcp_arb_init(&app->arb, now_ms, settings->serial, settings->seed, on_event, app);
     arb_nvm_init(&app->nvm, port);
     arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
     arb_limb_init(&app->limb, &app->arb.bus.nodes, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,

@@ -15,13 +15,15 @@ static void forget_bus(pdcp_arb_t *arb)
     }
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->bus);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_LINK, PDCP_CLOSED_MS);
     memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
     arb->asked_ms = arb->bus.now_ms;
     arb->bus.started_ms = arb->bus.now_ms;
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
 }
 
-void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx)
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t seed, pdcp_event_fn on_event,
+                   void *ctx)
 {
     memset(arb, 0, sizeof *arb);
     arb->bus.now_ms = now_ms;
@@ -29,6 +31,7 @@ void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event
     arb->bus.event_ctx = ctx;
     arb->spread_ms = (uint16_t)(serial % PDCP_STANDBY_SPREAD_MS);
     pdcp_unknown_init(&arb->bus.unknown, now_ms);
+    pdcp_bind_init(&arb->bus.bind, seed);
     forget_bus(arb);
 }
 
@@ -184,6 +187,11 @@ static bool is_beacon(const can_frame_t *frame)
     return frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
 }
 
+static bool is_reset_answer(const can_frame_t *frame)
+{
+    return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
+}
+
 static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
@@ -231,7 +239,12 @@ static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
     if (id < PDCP_NODE_MIN || id > PDCP_NODE_MAX) {
         return false;
     }
-    pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+    arb->bus.bind.shut = arb->bus.bind.shut || pdcp_bus_age_ms(&arb->bus) < PDCP_SHUT_MS;
+    if (is_reset_answer(frame)) {
+        pdcp_unknown_note_answer(&arb->bus.unknown, arb->bus.now_ms, id);
+    } else {
+        pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+    }
     if (!is_beacon(frame) || is_young(arb)) {
         return false;
     }
@@ -460,6 +473,25 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
     }
 }
 
+/* A frame on the id of an output. It is a stranger's if the output's device is lost, or the output was told
+ * to be silent and has had time to be: then it says nothing of the owner, and the output gets another id
+ * before it is enabled (D-BUS-36). */
+static bool on_channel_data(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    pdcp_channel_t *output =
+        &arb->bus.nodes.channels[pdcp_nodes_output(&arb->bus.nodes, node, pdcp_id_node(frame->id))];
+    const bool is_silenced = device->state == PDCP_NODE_READY && !output->enabled &&
+                             arb->bus.now_ms - arb->bus.silenced_ms >= PDCP_FADING_MS;
+    if (is_silenced || device->state == PDCP_NODE_LOST) {
+        pdcp_bind_take_output_id(&arb->bus, output);
+        return on_stranger(arb, frame);
+    }
+    device->heard_ms = arb->bus.now_ms;
+    count(arb, PDCP_STAT_CHANNEL_DATA);
+    return false;
+}
+
 /* A frame from a bound id whose identity asks again: whatever it says, its owner is alive (D-BUS-41). */
 static bool on_frame_in_check(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
@@ -505,11 +537,10 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return on_stranger(arb, frame);
     }
     pdcp_node_t *device = node_of(arb, node);
-    device->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     if (!is_device) {
-        count(arb, PDCP_STAT_CHANNEL_DATA);
-        return false;
+        return on_channel_data(arb, node, frame);
     }
+    device->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     if (device->asked_again) {
         return on_frame_in_check(arb, node, frame);
     }
@@ -542,12 +573,26 @@ static void on_beacon_deadline(pdcp_arb_t *arb)
     send_beacon(arb);
 }
 
+/* A device is gone for good. It may still speak on its ids, where it cannot be heard now. */
+static void forget(pdcp_arb_t *arb, uint8_t node)
+{
+    const pdcp_node_t *device = node_of(arb, node);
+    pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, device->node_id);
+    for (uint8_t c = device->first_channel; c != PDCP_NONE; c = arb->bus.nodes.channels[c].next) {
+        pdcp_channel_t *channel = &arb->bus.nodes.channels[c];
+        if (channel->transfer == PDCP_OUTPUT && channel->node_id != 0) {
+            pdcp_bind_take_output_id(&arb->bus, channel);
+        }
+    }
+    pdcp_nodes_remove(&arb->bus.nodes, node);
+}
+
 static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     const uint32_t unheard_ms = arb->bus.now_ms - device->heard_ms;
     if (device->state == PDCP_NODE_LOST) {
-        pdcp_nodes_remove(&arb->bus.nodes, node);
+        forget(arb, node);
     } else if (unheard_ms < silence_ms(device)) {
         set_life(arb, node, (uint16_t)(silence_ms(device) - unheard_ms));
     } else {
@@ -602,6 +647,7 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
     if (timer == PDCP_TIMER_BEACON) {
         on_beacon_deadline(arb);
     } else if (timer == PDCP_TIMER_LINK) {
+        pdcp_link_open(&arb->bus);
         pdcp_link_on_ready(&arb->bus, PDCP_NONE);
     } else if (timer == PDCP_TIMER_HOST) {
         on_host_deadline(arb);

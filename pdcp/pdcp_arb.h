@@ -44,8 +44,10 @@ typedef struct {
 } pdcp_arb_t;
 
 /* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).
- * The first beacon is due at once. */
-void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx);
+ * seed should differ from start to start: it decides where the ids of outputs begin (D-BUS-36). The first
+ * beacon is due at once. */
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t seed, pdcp_event_fn on_event,
+                   void *ctx);
 
 /* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. True:
  * it may have led to something, pdcp_arb_step is to be called. False: nothing is due earlier than before; so

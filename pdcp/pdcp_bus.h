@@ -46,8 +46,9 @@ typedef void (*pdcp_event_fn)(void *ctx, uint32_t now_ms, const pdcp_event_t *ev
 /* Small state stands first here and in the structs around it: on the smallest part, a field that lies farther
  * than 511 bytes from the beginning costs twice the instructions. */
 typedef struct pdcp_bus {
-    uint32_t now_ms;     /* of the call that the arbitrator is in: its functions note it first of all */
-    uint32_t started_ms; /* slides along behind: see pdcp_bus_age_ms */
+    uint32_t now_ms;      /* of the call that the arbitrator is in: its functions note it first of all */
+    uint32_t started_ms;  /* slides along behind: see pdcp_bus_age_ms */
+    uint32_t silenced_ms; /* when an output answered last that it is not enabled any more */
     pdcp_event_fn on_event;
     void *event_ctx;
     pdcp_link_t link;

@@ -9,6 +9,7 @@
 typedef enum {
     STEP_READ_VID_PID, /* Update Data Channel: what source the device names */
     STEP_READ_SERIAL,
+    STEP_OUTPUT_ID, /* if the output has none */
     STEP_INPUT_OFF, /* before its source is replaced */
     STEP_VID_PID,
     STEP_SERIAL,
@@ -24,6 +25,7 @@ void pdcp_link_init(pdcp_bus_t *bus)
     const bool planned = bus->link.planned;
     memset(&bus->link, 0, sizeof bus->link);
     bus->link.planned = planned;
+    bus->link.closed = true;
     bus->link.wish_input = PDCP_NONE;
     bus->link.at = PDCP_NONE;
 }
@@ -222,10 +224,15 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
     }
 }
 
+static bool is_about_output(const pdcp_bus_t *bus)
+{
+    return bus->link.step == STEP_OUTPUT_ON || bus->link.step == STEP_OUTPUT_ID;
+}
+
 /* The channel that the current step is about. */
 static uint8_t target_of(const pdcp_bus_t *bus)
 {
-    return bus->link.step == STEP_OUTPUT_ON ? bus->link.output : bus->link.input;
+    return is_about_output(bus) ? bus->link.output : bus->link.input;
 }
 
 static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
@@ -274,7 +281,7 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
         bus->link.undoing = false;
     }
     if (kind == PDCP_TODO_CONNECT) {
-        bus->link.step = STEP_INPUT_OFF;
+        bus->link.step = STEP_OUTPUT_ID;
         name_source(bus, channel);
     }
 }
@@ -420,16 +427,28 @@ static void advance(pdcp_bus_t *bus)
     }
 }
 
+static bool has_id(const pdcp_bus_t *bus, uint8_t output)
+{
+    return output != PDCP_NONE && bus->nodes.channels[output].node_id != 0;
+}
+
+/* Is the output there that the current step needs, with a node id or, in the step that gives it one, one to
+ * be had? */
+static bool has_output(pdcp_bus_t *bus)
+{
+    const uint8_t output = bus->link.output;
+    const bool is_giving = bus->link.step == STEP_OUTPUT_ID;
+    return is_ready(bus, output) && (has_id(bus, output) || (is_giving && pdcp_bind_output_id(bus) != 0));
+}
+
 /* Can the current step be carried out? Making a link needs its input in every step. */
 static bool step_possible(pdcp_bus_t *bus)
 {
-    if (bus->link.step == STEP_OUTPUT_ON || (bus->link.step == STEP_NODES && !bus->link.undoing)) {
-        if (!is_ready(bus, bus->link.output)) {
-            return false;
-        }
-        if (bus->link.undoing) {
-            return true;
-        }
+    if (bus->link.undoing) {
+        return is_ready(bus, target_of(bus));
+    }
+    if ((is_about_output(bus) || bus->link.step == STEP_NODES) && !has_output(bus)) {
+        return false;
     }
     return is_ready(bus, bus->link.input);
 }
@@ -470,6 +489,11 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
                              (uint16_t)((uint16_t)output->node_id << 8));
         }
         break;
+    case STEP_OUTPUT_ID:
+        *param = PDCP_OUT_NODE_ID;
+        low = output->node_id;
+        len = 1;
+        break;
     case STEP_INPUT_OFF:
         *param = PDCP_CH_ENABLED;
         len = input->enabled ? 1 : 0;
@@ -491,6 +515,9 @@ static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
 {
     uint8_t param;
     uint8_t bytes[PDCP_VALUE_MAX];
+    if (bus->link.step == STEP_OUTPUT_ID && !pdcp_bind_give_output_id(bus, channel)) {
+        return false;
+    }
     const uint8_t len = value_of(bus, &param, bytes);
     if (bus->link.step <= STEP_READ_SERIAL) {
         pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, PDCP_VALUE_MAX);
@@ -502,11 +529,20 @@ static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
     if (param == PDCP_CH_ENABLED && bytes[0] != 0) {
         channel->enabled = true; /* from now on it may be */
     }
+    if (bus->link.step == STEP_NODES && !bus->link.undoing) {
+        channel->node_id = bytes[1]; /* from now on it may listen to it */
+    }
     pdcp_request_set(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
     if (bus->link.once) {
         pdcp_request_limit_tries(bus, channel->node, 1);
     }
     return true;
+}
+
+/* An output is not enabled in the arbitrator's first time (D-BUS-36). */
+static bool is_too_early(const pdcp_bus_t *bus)
+{
+    return bus->link.closed && bus->link.step == STEP_OUTPUT_ON && !bus->link.undoing;
 }
 
 /* Carries the job on until it waits for an answer, waits for a device's place, or is over. */
@@ -520,7 +556,9 @@ static void run(pdcp_bus_t *bus)
             } else {
                 give_up(bus, PDCP_ERR_NO_ANSWER);
             }
-        } else if (!pdcp_request_is_idle(bus, channel->node)) {
+        } else if (bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output)) {
+            advance(bus);
+        } else if (!pdcp_request_is_idle(bus, channel->node) || is_too_early(bus)) {
             return;
         } else if (send_step(bus, channel)) {
             bus->link.at = channel->node;
@@ -530,15 +568,30 @@ static void run(pdcp_bus_t *bus)
     }
 }
 
+void pdcp_link_is_disabled(pdcp_bus_t *bus, pdcp_channel_t *channel)
+{
+    channel->enabled = false;
+    if (channel->transfer == PDCP_INPUT) {
+        channel->node_id = 0;
+    } else {
+        bus->silenced_ms = bus->now_ms;
+    }
+}
+
+void pdcp_link_open(pdcp_bus_t *bus)
+{
+    bus->link.closed = false;
+}
+
 static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     pdcp_channel_t *channel = channel_of(bus, target_of(bus));
     if (bus->link.step <= STEP_READ_SERIAL) {
         pdcp_nodes_take_source(channel, reply);
-    } else if (bus->link.step == STEP_INPUT_OFF) {
-        channel->enabled = false;
-    } else if (bus->link.step >= STEP_INPUT_ON) {
-        channel->enabled = !bus->link.undoing;
+    } else if (bus->link.step == STEP_INPUT_OFF || (bus->link.step >= STEP_INPUT_ON && bus->link.undoing)) {
+        pdcp_link_is_disabled(bus, channel);
+    } else if (bus->link.step == STEP_NODES && bus->link.undoing) {
+        channel->node_id = 0;
     }
 }
 
@@ -546,6 +599,10 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 static void on_failure(pdcp_bus_t *bus, pdcp_status_t status)
 {
     const bool silent = status == PDCP_ERR_NO_ANSWER;
+    if (bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output)) {
+        pdcp_bind_take_output_id(
+            bus, channel_of(bus, bus->link.output)); /* it may have it, and gets another one */
+    }
     if (!bus->link.undoing) {
         if (bus->link.step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
             advance(bus); /* a device without the profile layer (D-BUS-20) */

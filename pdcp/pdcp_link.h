@@ -14,11 +14,13 @@
 #include "pdcp_spec.h"
 
 struct pdcp_bus;
+struct pdcp_channel;
 
 typedef struct {
     bool planned;   /* the profile layer decides which links are made: none comes by itself */
     bool stored;    /* and from a stored configuration: Update Data Channel changes nothing */
     bool due;       /* some channel has something to do */
+    bool closed;    /* the arbitrator has just started: no output is enabled (D-BUS-36) */
     bool active;    /* a job is under way */
     bool undoing;   /* steps run backwards */
     bool once;      /* the device that failed is tried once only */
@@ -82,6 +84,12 @@ void pdcp_link_on_lost(struct pdcp_bus *bus, uint8_t node);
 
 /* A reply to a request of PDCP_CLIENT_LINK. */
 void pdcp_link_on_reply(struct pdcp_bus *bus, const pdcp_reply_t *reply);
+
+/* A channel has answered that its transfer is not enabled any more. */
+void pdcp_link_is_disabled(struct pdcp_bus *bus, struct pdcp_channel *channel);
+
+/* The first time after the start is over: outputs may be enabled. */
+void pdcp_link_open(struct pdcp_bus *bus);
 
 /* Starts what can be started. Costs nothing when there is nothing to do. */
 void pdcp_link_step(struct pdcp_bus *bus);

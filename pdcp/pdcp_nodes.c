@@ -102,7 +102,9 @@ static void cut_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t count)
             link = &channel->next;
         } else {
             *link = channel->next;
-            pdcp_nodes_set_output_id(nodes, channel, 0);
+            if (channel->transfer == PDCP_OUTPUT) {
+                pdcp_nodes_set_output_id(nodes, channel, 0);
+            }
             memset(channel, 0, sizeof *channel);
             channel->node = PDCP_NONE;
             pdcp_nodes_drop_feed(nodes, number);
@@ -191,6 +193,26 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
 {
     uint8_t channel = nodes->nodes[node].first_channel;
     while (channel != PDCP_NONE && nodes->channels[channel].index != index) {
+        channel = nodes->channels[channel].next;
+    }
+    return channel;
+}
+
+bool pdcp_nodes_may_hear(const pdcp_nodes_t *nodes, uint8_t node_id)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (nodes->channels[i].node_id == node_id && nodes->channels[i].transfer == PDCP_INPUT) {
+            return true;
+        }
+    }
+    return false;
+}
+
+uint8_t pdcp_nodes_output(const pdcp_nodes_t *nodes, uint8_t node, uint8_t node_id)
+{
+    uint8_t channel = nodes->nodes[node].first_channel;
+    while (channel != PDCP_NONE && (nodes->channels[channel].node_id != node_id ||
+                                    nodes->channels[channel].transfer != PDCP_OUTPUT)) {
         channel = nodes->channels[channel].next;
     }
     return channel;

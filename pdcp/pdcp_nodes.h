@@ -67,16 +67,17 @@ typedef enum {
     PDCP_TODO_AGAIN    /* silence it: the write before was not answered, and everybody else comes first */
 } pdcp_todo_t;
 
-typedef struct {
+typedef struct pdcp_channel {
     uint16_t type;
     uint16_t profile;
     uint8_t node;     /* place of the owner; PDCP_NONE: this entry of the pool is free */
     uint8_t index;    /* channel index, 1 to n */
     uint8_t next;     /* the owner's next channel, PDCP_NONE: the last */
     uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
-    uint8_t node_id;  /* outputs: 0 = none yet */
-    bool enabled;     /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
-    uint8_t todo;     /* pdcp_todo_t */
+    uint8_t node_id; /* outputs: their own, 0 = none yet; inputs: of the output that parameter 7 may name, 0 =
+                        none */
+    bool enabled;    /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
+    uint8_t todo;    /* pdcp_todo_t */
     /* Inputs only: */
     uint8_t link;         /* pdcp_link_status_t */
     uint8_t feed;         /* channel number of the source, PDCP_NONE: it is not on the bus */
@@ -139,6 +140,13 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
 
 /* No input is fed by this channel any more: it is gone, or no output now. */
 void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
+
+/* May an input still listen to this node id? It may until 0 was answered, in parameter 7 or to transfer
+ * enabled (D-BUS-36). */
+bool pdcp_nodes_may_hear(const pdcp_nodes_t *nodes, uint8_t node_id);
+
+/* Channel number of the output of a device that has this node id; PDCP_NONE: it has none. */
+uint8_t pdcp_nodes_output(const pdcp_nodes_t *nodes, uint8_t node, uint8_t node_id);
 
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
 void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id);

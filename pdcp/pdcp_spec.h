@@ -103,6 +103,9 @@ enum {
     PDCP_RECOVERY_MAX_MS = 5000,
     PDCP_YOUNG_MS = 1200,   /* first time of an arbitrator: no Reset to strangers (D-BUS-15), and silent
                                when another is heard (D-BUS-12) */
+    PDCP_CLOSED_MS = 500,   /* first time of an arbitrator: no output is enabled (D-BUS-36) */
+    PDCP_SHUT_MS = 11000,   /* and if an unknown id is heard in it: no output id is given (D-BUS-36) */
+    PDCP_FADING_MS = 100,   /* a disabled output may send what it has queued (D-BUS-36) */
     PDCP_AGE_MAX_MS = 20000 /* longer than any time that is counted from the start */
 };
 

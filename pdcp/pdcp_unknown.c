@@ -35,17 +35,23 @@ static uint8_t mask_of(uint8_t id)
     return (uint8_t)(1u << (id % 8u));
 }
 
+static bool has(const uint8_t *set, uint8_t id)
+{
+    return (set[id / 8] & mask_of(id)) != 0;
+}
+
+static void put(uint8_t *set, uint8_t id, bool is_in)
+{
+    uint8_t *byte = &set[id / 8];
+    *byte = (uint8_t)(is_in ? *byte | mask_of(id) : *byte & ~mask_of(id));
+}
+
 /* Notes the tick of a frame, or of a Reset. */
 static void set_tick(pdcp_unknown_t *unknown, uint8_t id, uint8_t tick, bool told)
 {
-    uint8_t *byte = &unknown->told[id / 8];
     unknown->heard[id] = tick;
-    *byte = (uint8_t)(told ? *byte | mask_of(id) : *byte & ~mask_of(id));
-}
-
-void pdcp_unknown_forget(pdcp_unknown_t *unknown, uint8_t id)
-{
-    set_tick(unknown, id, 0, false);
+    put(unknown->told, id, told);
+    put(unknown->answered, id, false);
 }
 
 /* Forgets what is too old to matter, before its tick comes round again. */
@@ -55,7 +61,7 @@ static void sweep(pdcp_unknown_t *unknown)
     for (uint16_t id = 0; id < sizeof unknown->heard; id++) {
         const uint8_t tick = unknown->heard[id];
         if (tick != 0 && ticks_since(unknown, tick) >= PDCP_UNKNOWN_QUIET) {
-            pdcp_unknown_forget(unknown, (uint8_t)id);
+            set_tick(unknown, (uint8_t)id, 0, false);
         }
     }
 }
@@ -78,24 +84,32 @@ void pdcp_unknown_on_time(pdcp_unknown_t *unknown, uint32_t now_ms)
     }
 }
 
-bool pdcp_unknown_is_told(const pdcp_unknown_t *unknown, uint8_t id)
+/* Was it told to reset less than a second ago? */
+static bool is_told(const pdcp_unknown_t *unknown, uint8_t id)
 {
-    return (unknown->told[id / 8] & mask_of(id)) != 0 &&
-           ticks_since(unknown, unknown->heard[id]) < PDCP_UNKNOWN_RESET_PAUSE;
+    return has(unknown->told, id) && ticks_since(unknown, unknown->heard[id]) < PDCP_UNKNOWN_RESET_PAUSE;
 }
 
 void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_on_time(unknown, now_ms);
-    if (!pdcp_unknown_is_told(unknown, id)) { /* else the time of the Reset stays, for its pause */
+    if (is_told(unknown, id)) { /* the time of the Reset stays, for its pause */
+        put(unknown->answered, id, false);
+    } else {
         set_tick(unknown, id, unknown->tick, false);
     }
+}
+
+void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
+{
+    pdcp_unknown_note(unknown, now_ms, id);
+    put(unknown->answered, id, is_told(unknown, id));
 }
 
 bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_on_time(unknown, now_ms);
-    if (pdcp_unknown_is_told(unknown, id)) {
+    if (is_told(unknown, id)) {
         return false;
     }
     const bool is_whole = now_ms == unknown->tick_ms;
@@ -106,6 +120,9 @@ bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 uint8_t pdcp_unknown_silence(const pdcp_unknown_t *unknown, uint8_t id)
 {
     const uint8_t tick = unknown->heard[id];
-    const uint8_t ticks = tick != 0 ? ticks_since(unknown, tick) : (uint8_t)PDCP_UNKNOWN_QUIET;
+    if (tick == 0 || has(unknown->answered, id)) {
+        return PDCP_UNKNOWN_QUIET;
+    }
+    const uint8_t ticks = ticks_since(unknown, tick);
     return ticks < PDCP_UNKNOWN_QUIET ? ticks : (uint8_t)PDCP_UNKNOWN_QUIET;
 }

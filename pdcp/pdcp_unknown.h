@@ -16,11 +16,12 @@ enum {
 };
 
 typedef struct {
-    uint32_t tick_ms;      /* when the tick under way began */
-    uint8_t tick;          /* its number, 1 to 255, then 1 again */
-    uint8_t swept;         /* tick of the last sweep */
-    uint8_t heard[256];    /* by node id: tick of the last frame, or of the last Reset; 0: quiet */
-    uint8_t told[256 / 8]; /* by node id: heard[] is the tick of a Reset, less than a second ago */
+    uint32_t tick_ms;          /* when the tick under way began */
+    uint8_t tick;              /* its number, 1 to 255, then 1 again */
+    uint8_t swept;             /* tick of the last sweep */
+    uint8_t heard[256];        /* by node id: tick of the last frame, or of the last Reset; 0: quiet */
+    uint8_t answered[256 / 8]; /* by node id: whoever was told has answered, and was not heard since */
+    uint8_t told[256 / 8];     /* by node id: heard[] is the tick of a Reset, less than a second ago */
 } pdcp_unknown_t;
 
 /* All ids are quiet. */
@@ -32,14 +33,12 @@ void pdcp_unknown_on_time(pdcp_unknown_t *unknown, uint32_t now_ms);
 /* A frame came from this id, or its owner was just forgotten. */
 void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
 
-/* Whoever spoke on this id does so no longer: it has answered its Reset. */
-void pdcp_unknown_forget(pdcp_unknown_t *unknown, uint8_t id);
+/* An answer to Reset Device came from this id. If the id was told to reset, its speaker is silent from now
+ * on. */
+void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
 
 /* May the id be told to reset now? If so, it counts as told. */
 bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
-
-/* Was the id told to reset less than a second ago? */
-bool pdcp_unknown_is_told(const pdcp_unknown_t *unknown, uint8_t id);
 
 /* Ticks since a frame was heard on this id, as of the last of the calls above; PDCP_UNKNOWN_QUIET: it is
  * quiet. */

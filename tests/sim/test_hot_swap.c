@@ -379,7 +379,7 @@ static void test_a_standby_takes_the_limb_over(void)
     TEST_ASSERT_EQUAL(PROFILE_WAITING, arb_limb_state(&second.limb));
     limb_expect(&limb, LINKS);
     limb_stop_arbitrator(&limb);
-    run_both(8000);
+    run_both(PDCP_SHUT_MS + 5000); /* outputs get no ids before (D-BUS-36) */
     TEST_ASSERT_EQUAL(PROFILE_RUNNING, arb_limb_state(&second.limb));
     TEST_ASSERT_EQUAL(3, links_of_second()); /* read back: it makes up none */
     const int count = limb.parts[D3].received[1];
@@ -647,7 +647,7 @@ static void test_the_command_line_overrides_the_flags(void)
     limb.settings.no_autoconfig = false;
     limb_start_arbitrator(&limb);
     limb_want(&limb, LINKS);
-    limb_await(&limb, 6000);
+    limb_await(&limb, PDCP_SHUT_MS + 2000); /* the parts lived on (D-BUS-36) */
 }
 
 /* Nothing stands in, but an original comes back. */

@@ -43,29 +43,35 @@ static void to_text(const can_frame_t *frame, char *text, size_t size)
     }
 }
 
+static void pass_first_time(exchange_t *x)
+{
+    exchange_tx(x, "100#0A");
+    exchange_wait(x, PDCP_CLOSED_MS);
+    exchange_tx(x, "100#0A");
+    exchange_silence(x);
+}
+
 void exchange_start(exchange_t *x, uint32_t now_ms)
 {
     /* Not in exchange_t: the RAM of a small machine does not hold it beside an application. */
     static pdcp_arb_t alone;
     memset(x, 0, sizeof *x);
-    x->now_ms = now_ms;
+    x->now_ms = now_ms - PDCP_CLOSED_MS;
     x->arb = &alone;
-    pdcp_arb_init(x->arb, now_ms, 250, on_event, x);
-    exchange_tx(x, "100#0A");
-    exchange_silence(x);
+    pdcp_arb_init(x->arb, x->now_ms, 250, EXCHANGE_SEED, on_event, x);
+    pass_first_time(x);
 }
 
 void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings,
                         uint32_t now_ms)
 {
     memset(x, 0, sizeof *x);
-    x->now_ms = now_ms;
+    x->now_ms = now_ms - PDCP_CLOSED_MS;
     x->app = app;
     x->arb = &app->arb;
-    arb_app_init(app, port, settings, now_ms);
+    arb_app_init(app, port, settings, x->now_ms);
     arb_app_observe(app, on_event, x);
-    exchange_tx(x, "100#0A");
-    exchange_silence(x);
+    pass_first_time(x);
 }
 
 void exchange_step(exchange_t *x)

@@ -5,7 +5,10 @@
 
 #include "arb_app.h"
 
-enum { EXCHANGE_EVENTS = 48 };
+enum {
+    EXCHANGE_EVENTS = 48,
+    EXCHANGE_SEED = 253 /* the first output gets id FEh, the next ones count downwards (D-BUS-36) */
+};
 
 typedef struct {
     pdcp_arb_t *arb; /* the one that stands alone, of which a program has one, or the one of app */
@@ -15,7 +18,8 @@ typedef struct {
     int event_count;
 } exchange_t;
 
-/* A fresh arbitrator at now_ms, whose first beacon has left already. */
+/* An arbitrator that was started PDCP_CLOSED_MS before now_ms, so that outputs may be enabled (D-BUS-36). Its
+ * beacons have left already. */
 void exchange_start(exchange_t *x, uint32_t now_ms);
 
 /* The same with a whole application, whose port's can_send must refuse: its frames are taken from its queue.

@@ -78,7 +78,7 @@ static const arb_port_t port = {.can_send = can_send,
 
 static void start(void)
 {
-    const arb_settings_t settings = {.no_autoconfig = true};
+    const arb_settings_t settings = {.seed = EXCHANGE_SEED, .no_autoconfig = true};
     exchange_start_app(&x, &app, &port, &settings, 0xFFFFFF00u);
 }
 

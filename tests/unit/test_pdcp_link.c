@@ -306,6 +306,15 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
         {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
         {NULL, NULL},
     };
+    static const exchange_pair_t making_again[] = {
+        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
+        {"312#04 06 01 0400 01", "212#84 01 06 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
+        {"312#04 07 01 11 FD", "212#84 01 07 01"},
+        {"312#04 04 01 01", "212#84 01 04 01"},
+        {"311#04 04 01 01", "211#84 01 04 01"},
+        {NULL, NULL},
+    };
     make_link();
     for (int i = 0; i < 24; i++) {
         exchange_pass(&x, 500);
@@ -318,8 +327,8 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
     TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
     TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->feed);
-    exchange_add_output(&x, "FE");
-    exchange_run(&x, making);
+    exchange_add_output(&x, "FD"); /* a freed id is given out last (D-BUS-36) */
+    exchange_run(&x, making_again);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
 }
 

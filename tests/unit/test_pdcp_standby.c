@@ -21,7 +21,7 @@ static uint32_t stat_of(pdcp_stat_t stat)
 /* D-BUS-12: heard within 1200 ms of the own start. */
 static void test_a_second_arbitrator_goes_silent(void)
 {
-    exchange_pass(&x, 1199);
+    exchange_pass(&x, 1199 - PDCP_CLOSED_MS);
     exchange_rx(&x, "100#0A");
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SILENT));
     exchange_rx(&x, "611#01 0200 0200 0400"); /* nobody is granted anything */

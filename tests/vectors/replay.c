@@ -13,6 +13,7 @@
 #define CLOCK_MS 0xFFFFF000uL /* the arbitrator's clock at the log's 0: it wraps after four seconds */
 
 enum {
+    SEED = 253,   /* the first output gets id 254, the next ones count downwards (D-BUS-36) */
     SERIAL = 250, /* of the arbitrator: its standby ends after 2250 ms (D-BUS-12) */
     LINE_SIZE = 256,
     WORDS_MAX = 5,
@@ -536,7 +537,7 @@ int main(int argc, char **argv)
         (void)fputs("usage: replay LOG\n", stderr);
         return 2;
     }
-    pdcp_arb_init(&replay.arb, clock_ms(&replay), SERIAL, on_event, &replay);
+    pdcp_arb_init(&replay.arb, clock_ms(&replay), SERIAL, SEED, on_event, &replay);
     step(&replay);
     play(&replay, argv[1]);
     expect_nothing(&replay);

@@ -6,9 +6,15 @@
 #include "pdcp_setup.h"
 #include "pdcp_time.h"
 
-/* Nothing is known of the bus; what is remembered and counted stays. */
+/* Nothing is known of the bus; what is remembered and counted stays. Its devices may still speak. */
 static void forget_bus(pdcp_arb_t *arb)
 {
+    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+        if (arb->bus.nodes.owner[id] != 0) {
+            pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+        }
+    }
+    arb->bus.bind.shut = pdcp_unknown_any(&arb->bus.unknown);
     pdcp_nodes_init(&arb->bus.nodes);
     for (int i = 0; i < PDCP_TIMER_RECOVERY; i++) { /* a controller that is off leaves that state */
         pdcp_timers_cancel(&arb->bus.timers, (uint8_t)i);
@@ -19,6 +25,9 @@ static void forget_bus(pdcp_arb_t *arb)
     memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
     arb->asked_ms = arb->bus.now_ms;
     arb->bus.started_ms = arb->bus.now_ms;
+    arb->beacon_ms = arb->bus.now_ms;
+    arb->held_ms = 0;
+    arb->listening = false;
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
 }
 
@@ -29,7 +38,7 @@ void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t s
     arb->bus.now_ms = now_ms;
     arb->bus.on_event = on_event;
     arb->bus.event_ctx = ctx;
-    arb->spread_ms = (uint16_t)(serial % PDCP_STANDBY_SPREAD_MS);
+    arb->serial = serial;
     pdcp_unknown_init(&arb->bus.unknown, now_ms);
     pdcp_bind_init(&arb->bus.bind, seed);
     forget_bus(arb);
@@ -192,6 +201,83 @@ static bool is_reset_answer(const can_frame_t *frame)
     return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
 }
 
+/* Has it granted an id to a device (D-BUS-42)? */
+static bool has_own(const pdcp_arb_t *arb)
+{
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        const uint8_t state = arb->bus.nodes.nodes[i].state;
+        if (state != PDCP_NODE_FREE && state != PDCP_NODE_ASKED) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* How much longer the answer to a bind request is held that came now: another arbitrator may be there and
+ * answer it (D-BUS-42). */
+static uint16_t hold_ms(const pdcp_arb_t *arb)
+{
+    const uint16_t own_ms = (uint16_t)(PDCP_HOLD_MS + arb->serial % PDCP_HOLD_SPREAD_MS);
+    const uint32_t heard_ms = arb->bus.now_ms - arb->standby.since_ms;
+    const bool waits = pdcp_standby_is_heard(&arb->standby, arb->bus.now_ms) && !arb->standby.doubted;
+    return waits && heard_ms < PDCP_HOLD_FOREIGN_MS ? (uint16_t)(own_ms + PDCP_HOLD_FOREIGN_MS - heard_ms)
+                                                    : own_ms;
+}
+
+/* Place of the identity whose request is held; PDCP_NONE: it is not. */
+static uint8_t held_place(const pdcp_arb_t *arb, const pdcp_identity_t *identity)
+{
+    const uint8_t place = pdcp_nodes_find(&arb->bus.nodes, identity);
+    return place != PDCP_NONE && arb->bus.nodes.nodes[place].state == PDCP_NODE_ASKED ? place
+                                                                                      : (uint8_t)PDCP_NONE;
+}
+
+static void drop_held(pdcp_arb_t *arb, uint8_t place)
+{
+    pdcp_timers_cancel(&arb->bus.timers, (uint8_t)(PDCP_TIMER_LIFE + place));
+    pdcp_nodes_remove(&arb->bus.nodes, place);
+}
+
+static void bind(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
+{
+    uint8_t node;
+    const pdcp_bind_result_t result = pdcp_bind_on_request(&arb->bus, identity, asked, &node);
+    after_bind(arb, node, result);
+    if (node != PDCP_NONE) {
+        serve(arb, node);
+    }
+}
+
+/* An arbitrator without devices of its own lets another one go first. Without a place the device asks again.
+ */
+static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
+{
+    const uint8_t place = pdcp_nodes_free_place(&arb->bus.nodes);
+    if (place == PDCP_NONE) {
+        count(arb, PDCP_STAT_NO_ROOM);
+        return;
+    }
+    pdcp_nodes_hold(&arb->bus.nodes, place, identity);
+    node_of(arb, place)->asked_id = asked;
+    node_of(arb, place)->heard_ms = arb->bus.now_ms;
+    set_life(arb, place, hold_ms(arb));
+}
+
+/* Nobody else has answered the request that is held. Others that came with it follow one after the other: set
+ * up all at once they would only wait for each other. */
+static void on_held(pdcp_arb_t *arb, uint8_t place)
+{
+    const pdcp_node_t held = *node_of(arb, place);
+    arb->held_ms = (uint16_t)(arb->bus.now_ms - held.heard_ms);
+    drop_held(arb, place);
+    bind(arb, &held.identity, held.asked_id);
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (node_of(arb, i)->state == PDCP_NODE_ASKED) {
+            set_life(arb, i, PDCP_HOLD_PACE_MS);
+        }
+    }
+}
+
 static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
@@ -204,14 +290,16 @@ static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
         count(arb, PDCP_STAT_DROP_BAD_DLC);
         return;
     }
-    uint8_t node;
     count(arb, PDCP_STAT_TAKEN);
     arb->asked_ms = arb->bus.now_ms;
-    const pdcp_bind_result_t result =
-        pdcp_bind_on_request(&arb->bus, &msg.identity, pdcp_id_node(frame->id), &node);
-    after_bind(arb, node, result);
-    if (node != PDCP_NONE) {
-        serve(arb, node);
+    const uint8_t place = held_place(arb, &msg.identity);
+    if (place != PDCP_NONE) { /* the newer request replaces the older one */
+        drop_held(arb, place);
+    }
+    if (has_own(arb)) {
+        bind(arb, &msg.identity, pdcp_id_node(frame->id));
+    } else {
+        hold(arb, &msg.identity, pdcp_id_node(frame->id));
     }
 }
 
@@ -231,6 +319,151 @@ static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
     }
 }
 
+/* Without a bus what waits is stale when there is one again; requests repeat themselves, and an answer to
+ * what has been given up long ago would be taken for that to a newer one. */
+static void discard_queue(pdcp_arb_t *arb)
+{
+    arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
+    pdcp_txq_init(&arb->bus.txq);
+}
+
+/* D-BUS-42: this arbitrator goes on standby; the host, if it waits, is told. */
+static void go_silent(pdcp_arb_t *arb)
+{
+    arb->silent = true;
+    host_ends(arb, PDCP_ERR_NO_ANSWER);
+    if (pdcp_link_wish_waits(&arb->bus)) {
+        pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
+    }
+    forget_bus(arb);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
+                  (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
+}
+
+/* The standby is over: the other arbitrator is gone, or serves no longer (D-BUS-42). */
+static void take_over(pdcp_arb_t *arb)
+{
+    arb->silent = false;
+    forget_bus(arb);
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
+}
+
+/* Without devices of its own an arbitrator goes on standby when another one serves; with some it stays, but
+ * when two hear each other for long, the one whose time comes first yields (D-BUS-42). */
+static bool is_to_yield(const pdcp_arb_t *arb)
+{
+    const uint32_t now_ms = arb->bus.now_ms;
+    const uint32_t stays_ms = PDCP_YIELD_MS + arb->serial % PDCP_YIELD_SPREAD_MS;
+    return pdcp_standby_serves(&arb->standby, now_ms) &&
+           (!has_own(arb) || now_ms - arb->standby.since_ms >= stays_ms);
+}
+
+static void on_foreign_beacon(pdcp_arb_t *arb)
+{
+    count(arb, PDCP_STAT_FOREIGN_BEACON);
+    const bool is_first = pdcp_standby_on_beacon(&arb->standby, arb->bus.now_ms);
+    if (arb->silent) {
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
+                      (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
+        return;
+    }
+    if (is_first) {
+        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_FOREIGN, PDCP_NONE);
+    }
+    if (is_to_yield(arb)) {
+        go_silent(arb);
+    }
+}
+
+/* Another arbitrator has answered a bind request: what is held of this identity is its business. */
+static void on_foreign_grant(pdcp_arb_t *arb, const pdcp_identity_t *identity)
+{
+    const uint8_t place = held_place(arb, identity);
+    if (place != PDCP_NONE) {
+        drop_held(arb, place);
+    }
+    if (arb->silent) {
+        pdcp_standby_on_sign_of_life(&arb->standby);
+        pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_STANDBY);
+    }
+}
+
+/* A frame of a device may answer another arbitrator. */
+static void on_foreign_answer(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    if (pdcp_id_node(frame->id) != arb->standby.asked_id || arb->standby.asked_id == 0 ||
+        !pdcp_standby_on_answer(&arb->standby, arb->bus.now_ms, frame)) {
+        return;
+    }
+    if (arb->silent) {
+        pdcp_standby_on_sign_of_life(&arb->standby);
+    } else if (is_to_yield(arb)) {
+        go_silent(arb);
+    }
+}
+
+static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    pdcp_msg_t msg;
+    if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
+        count(arb, PDCP_STAT_DROP_UNUSED_ID);
+        return;
+    }
+    if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && is_beacon(frame)) {
+        on_foreign_beacon(arb);
+        return;
+    }
+    count(arb, PDCP_STAT_DROP_ARBITRATOR);
+    if (pdcp_decode(frame, &msg) == PDCP_DECODE_OK && msg.code == (PDCP_BIND_DEVICE | PDCP_ANSWER)) {
+        on_foreign_grant(arb, &msg.identity);
+    } else {
+        pdcp_standby_on_request(&arb->standby, frame);
+    }
+}
+
+/* On standby, a bind request that stays without an answer may mean that the other arbitrator serves no
+ * longer. True: it is waited for. */
+static bool on_frame_on_standby(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    count(arb, PDCP_STAT_DROP_SILENT);
+    if (pdcp_id_priority(frame->id) != PDCP_PRIORITY_BINDING) {
+        pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, pdcp_id_node(frame->id));
+        on_foreign_answer(arb, frame);
+        return false;
+    }
+    if (!pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_STANDBY)) {
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_STANDBY, PDCP_UNBOUND_WAIT_MS);
+    }
+    return true;
+}
+
+/* Its own beacons have not left for too long: others may have taken over. It sends nothing and listens
+ * (D-BUS-42). */
+static void listen(pdcp_arb_t *arb)
+{
+    arb->listening = true;
+    discard_queue(arb);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_STANDBY, PDCP_LISTEN_MS);
+}
+
+static void on_standby_deadline(pdcp_arb_t *arb)
+{
+    const uint32_t now_ms = arb->bus.now_ms;
+    if (arb->silent) {
+        if (pdcp_standby_on_unbound(&arb->standby, now_ms, now_ms - PDCP_UNBOUND_WAIT_MS)) {
+            take_over(arb);
+        }
+    } else if (pdcp_standby_serves(&arb->standby, now_ms)) {
+        go_silent(arb);
+    } else {
+        arb->listening = false;
+        arb->beacon_ms = now_ms;
+        discard_queue(arb);
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
+    }
+}
+
 /* A frame from an id that is not bound. True: there is something to be sent. */
 static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
 {
@@ -245,51 +478,12 @@ static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
     } else {
         pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
     }
-    if (!is_beacon(frame) || is_young(arb)) {
-        return false;
+    on_foreign_answer(arb, frame);
+    if (!is_beacon(frame) || arb->silent || is_young(arb)) {
+        return arb->silent;
     }
     reset_stranger(arb, id);
     return true;
-}
-
-/* D-BUS-12: this arbitrator falls silent; the host, if it waits, is told. */
-static void go_silent(pdcp_arb_t *arb)
-{
-    arb->silent = true;
-    host_ends(arb, PDCP_ERR_NO_ANSWER);
-    if (pdcp_link_wish_waits(&arb->bus)) {
-        pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
-    }
-    forget_bus(arb);
-    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
-}
-
-/* D-BUS-12: heard soon after the own start, another arbitrator was there first; heard later, this one was. */
-static void on_foreign_beacon(pdcp_arb_t *arb)
-{
-    const bool again = arb->foreign && pdcp_time_before(arb->bus.now_ms, arb->foreign_ms + PDCP_STANDBY_MS);
-    count(arb, PDCP_STAT_FOREIGN_BEACON);
-    arb->foreign = true;
-    arb->foreign_ms = arb->bus.now_ms;
-    if (!arb->silent && is_young(arb)) {
-        go_silent(arb);
-    } else if (!arb->silent && !again) {
-        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_FOREIGN, PDCP_NONE);
-    }
-    if (arb->silent) {
-        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, (uint16_t)(PDCP_STANDBY_MS + arb->spread_ms));
-    }
-}
-
-static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
-{
-    if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
-        count(arb, PDCP_STAT_DROP_UNUSED_ID);
-    } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && is_beacon(frame)) {
-        on_foreign_beacon(arb);
-    } else {
-        count(arb, PDCP_STAT_DROP_ARBITRATOR);
-    }
 }
 
 /* The counters stand in the order of the kinds. */
@@ -299,20 +493,19 @@ static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
 }
 
 /* True: it was the first one, or the device was lost. */
-static bool on_beacon(pdcp_arb_t *arb, uint8_t node)
+static bool on_beacon(pdcp_arb_t *arb, pdcp_node_t *device)
 {
-    pdcp_node_t *device = node_of(arb, node);
     count(arb, PDCP_STAT_TAKEN);
     if (device->beaconed && device->state != PDCP_NODE_LOST) {
         return false;
     }
     if (device->state == PDCP_NODE_LOST) {
-        begin_setup(arb, node); /* reads who it is before anything else (D-BUS-15) */
+        begin_setup(arb, device->place); /* reads who it is before anything else (D-BUS-15) */
         device->taken_back = true;
-        serve(arb, node);
+        serve(arb, device->place);
     }
     device->beaconed = true;
-    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_BOUND, node);
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_BOUND, device->place);
     return true;
 }
 
@@ -449,6 +642,9 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
+    if (arb->listening) {
+        on_foreign_answer(arb, frame);
+    }
     bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
     if (!replied) {
         const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
@@ -492,23 +688,15 @@ static bool on_channel_data(pdcp_arb_t *arb, uint8_t node, const can_frame_t *fr
     return false;
 }
 
-/* A frame from a bound id whose identity asks again: whatever it says, its owner is alive (D-BUS-41). */
-static bool on_frame_in_check(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
+/* A frame came from a bound id whose identity asks again, and was no answer to the request under way:
+ * whatever it says, its owner is alive (D-BUS-41). */
+static void end_check(pdcp_arb_t *arb, uint8_t node)
 {
-    const pdcp_node_t *device = node_of(arb, node);
-    if (is_beacon(frame)) {
-        (void)on_beacon(arb, node);
-    } else {
-        on_message(arb, node, frame);
+    if (node_of(arb, node)->request.client == PDCP_CLIENT_BIND) {
+        pdcp_request_cancel(&arb->bus, node);
     }
-    if (device->asked_again) { /* the frame was no answer to the request under way */
-        if (device->request.client == PDCP_CLIENT_BIND) {
-            pdcp_request_cancel(&arb->bus, node);
-        }
-        (void)conclude_check(arb, node, PDCP_OK);
-        serve(arb, node);
-    }
-    return true;
+    (void)conclude_check(arb, node, PDCP_OK);
+    serve(arb, node);
 }
 
 bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
@@ -524,8 +712,7 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return arb->silent;
     }
     if (arb->silent) {
-        count(arb, PDCP_STAT_DROP_SILENT);
-        return false;
+        return on_frame_on_standby(arb, frame);
     }
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         on_bind_frame(arb, frame);
@@ -541,14 +728,17 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return on_channel_data(arb, node, frame);
     }
     device->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
-    if (device->asked_again) {
-        return on_frame_in_check(arb, node, frame);
-    }
+    bool due = true;
     if (is_beacon(frame)) {
-        return on_beacon(arb, node); /* by far the most frequent: without decoding */
+        due = on_beacon(arb, device); /* by far the most frequent: without decoding */
+    } else {
+        on_message(arb, node, frame);
     }
-    on_message(arb, node, frame);
-    return true;
+    if (device->asked_again) {
+        end_check(arb, node);
+        due = true;
+    }
+    return due;
 }
 
 static void send_beacon(pdcp_arb_t *arb)
@@ -557,18 +747,16 @@ static void send_beacon(pdcp_arb_t *arb)
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, PDCP_BEACON_MS);
 }
 
-/* The beacon's deadline is also the end of the standby: long enough no other arbitrator was heard (D-BUS-12).
- */
+/* The beacon's deadline is also the end of the standby: no other arbitrator was heard for long enough
+ * (D-BUS-35). */
 static void on_beacon_deadline(pdcp_arb_t *arb)
 {
     arb->bus.started_ms = arb->bus.now_ms - pdcp_bus_age_ms(&arb->bus); /* a longer difference would wrap */
     pdcp_unknown_on_time(&arb->bus.unknown, arb->bus.now_ms);
     pdcp_bind_on_time(&arb->bus);
+    pdcp_standby_on_time(&arb->standby, arb->bus.now_ms);
     if (arb->silent) {
-        arb->silent = false;
-        arb->foreign = false;
-        forget_bus(arb);
-        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
+        take_over(arb);
     }
     send_beacon(arb);
 }
@@ -591,7 +779,9 @@ static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     const uint32_t unheard_ms = arb->bus.now_ms - device->heard_ms;
-    if (device->state == PDCP_NODE_LOST) {
+    if (device->state == PDCP_NODE_ASKED) {
+        on_held(arb, node);
+    } else if (device->state == PDCP_NODE_LOST) {
         forget(arb, node);
     } else if (unheard_ms < silence_ms(device)) {
         set_life(arb, node, (uint16_t)(silence_ms(device) - unheard_ms));
@@ -634,14 +824,6 @@ static void on_request_deadline(pdcp_arb_t *arb, uint8_t node)
     serve(arb, node);
 }
 
-/* Without a bus what waits is stale when there is one again; requests repeat themselves, and an answer to
- * what has been given up long ago would be taken for that to a newer one. */
-static void discard_queue(pdcp_arb_t *arb)
-{
-    arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
-    pdcp_txq_init(&arb->bus.txq);
-}
-
 static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 {
     if (timer == PDCP_TIMER_BEACON) {
@@ -651,6 +833,8 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
         pdcp_link_on_ready(&arb->bus, PDCP_NONE);
     } else if (timer == PDCP_TIMER_HOST) {
         on_host_deadline(arb);
+    } else if (timer == PDCP_TIMER_STANDBY) {
+        on_standby_deadline(arb);
     } else if (timer == PDCP_TIMER_RECOVERY) {
         discard_queue(arb);
         arb->restart = true;
@@ -661,10 +845,20 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
     }
 }
 
+/* Was it not called, or off the bus, for so long that others may have taken it for gone? */
+static bool is_hung(const pdcp_arb_t *arb)
+{
+    return !arb->silent && !arb->listening && arb->recovery.state < (uint8_t)PDCP_BUS_OFF &&
+           arb->bus.now_ms - arb->beacon_ms > PDCP_HUNG_MS;
+}
+
 uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
 {
     uint8_t timer;
     arb->bus.now_ms = now_ms;
+    if (is_hung(arb)) {
+        listen(arb);
+    }
     while (pdcp_timers_take_due(&arb->bus.timers, now_ms, &timer)) {
         on_deadline(arb, timer);
     }
@@ -678,11 +872,14 @@ uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
 
 const can_frame_t *pdcp_arb_tx_peek(const pdcp_arb_t *arb)
 {
-    return pdcp_txq_peek(&arb->bus.txq);
+    return arb->listening ? NULL : pdcp_txq_peek(&arb->bus.txq);
 }
 
 void pdcp_arb_tx_pop(pdcp_arb_t *arb)
 {
+    if (is_beacon(pdcp_txq_peek(&arb->bus.txq))) {
+        arb->beacon_ms = arb->bus.now_ms;
+    }
     pdcp_txq_pop(&arb->bus.txq);
     count(arb, PDCP_STAT_TX);
 }
@@ -694,7 +891,7 @@ static bool is_bound(pdcp_arb_t *arb, uint8_t node)
         return false;
     }
     const uint8_t state = node_of(arb, node)->state;
-    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST;
+    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST && state != PDCP_NODE_ASKED;
 }
 
 static pdcp_status_t host_request(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param,

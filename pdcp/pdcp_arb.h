@@ -15,6 +15,7 @@
 #include "can_frame.h"
 #include "pdcp_bus.h"
 #include "pdcp_recovery.h"
+#include "pdcp_standby.h"
 
 /* The host's request to a device; one at a time. */
 typedef struct {
@@ -32,18 +33,20 @@ typedef struct {
 } pdcp_host_request_t;
 
 typedef struct {
-    uint32_t asked_ms;   /* when a device asked to bind last, or the start */
-    uint32_t foreign_ms; /* when another arbitrator was heard last */
-    bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */
-    bool silent;         /* on standby (D-BUS-12) */
-    bool restart;        /* the controller is to be restarted */
+    uint32_t asked_ms;  /* when a device asked to bind last, or the start */
+    uint32_t beacon_ms; /* when its last beacon left */
+    uint32_t serial;
+    uint16_t held_ms; /* so long was the last grant held; taken off the start-up's quiet time (D-BUS-34) */
+    bool silent;      /* on standby (D-BUS-42) */
+    bool listening;   /* its beacons did not leave for too long: it sends nothing for a while (D-BUS-42) */
+    bool restart;     /* the controller is to be restarted */
     pdcp_host_request_t host;
     pdcp_bus_t bus;
     pdcp_recovery_t recovery;
-    uint16_t spread_ms; /* of the standby, from the serial number */
+    pdcp_standby_t standby;
 } pdcp_arb_t;
 
-/* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).
+/* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads the times of D-BUS-42.
  * seed should differ from start to start: it decides where the ids of outputs begin (D-BUS-36). The first
  * beacon is due at once. */
 void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t seed, pdcp_event_fn on_event,

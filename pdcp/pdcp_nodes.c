@@ -53,6 +53,12 @@ void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *i
     nodes->owner[node_id] = (uint8_t)(place + 1);
 }
 
+void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity)
+{
+    nodes->nodes[place].state = PDCP_NODE_ASKED;
+    nodes->nodes[place].identity = *identity;
+}
+
 static void drop_needs(pdcp_nodes_t *nodes, pdcp_node_t *gone)
 {
     const uint16_t size = (uint16_t)(2u * gone->needs_stride * gone->channel_count);

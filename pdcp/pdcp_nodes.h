@@ -20,7 +20,8 @@ typedef enum {
     PDCP_NODE_SETUP,  /* bound, being read and written */
     PDCP_NODE_READY,  /* set up: its channels count */
     PDCP_NODE_FAILED, /* bound, but its setup failed: no channels, no links */
-    PDCP_NODE_LOST    /* silent for too long: ids and links are kept for it */
+    PDCP_NODE_LOST,   /* silent for too long: ids and links are kept for it */
+    PDCP_NODE_ASKED   /* its bind request is held (D-BUS-42): neither node id nor channels yet */
 } pdcp_node_state_t;
 
 typedef struct {
@@ -41,7 +42,7 @@ typedef struct {
     bool taken_back;       /* it beaconed while lost; who it is has not been read yet (D-BUS-15) */
     bool reset_asked;      /* Reset Device is to be sent, or is under way */
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
-    uint8_t asked_id;      /* with this id */
+    uint8_t asked_id;      /* with this id; also of a request that is held */
     bool setup_again;      /* it was left before: tried once more, silently (D-BUS-17) */
     uint8_t setup_pass;    /* pdcp_setup.c */
     uint8_t setup_step;
@@ -107,6 +108,9 @@ uint8_t pdcp_nodes_free_place(const pdcp_nodes_t *nodes);
 
 /* Takes a free place for a device with this node id, which must be free. */
 void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id);
+
+/* Takes a free place for a device whose bind request is held. */
+void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity);
 
 /* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
  * nothing. */

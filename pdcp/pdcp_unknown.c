@@ -126,3 +126,13 @@ uint8_t pdcp_unknown_silence(const pdcp_unknown_t *unknown, uint8_t id)
     const uint8_t ticks = ticks_since(unknown, tick);
     return ticks < PDCP_UNKNOWN_QUIET ? ticks : (uint8_t)PDCP_UNKNOWN_QUIET;
 }
+
+bool pdcp_unknown_any(const pdcp_unknown_t *unknown)
+{
+    for (uint16_t id = 0; id < sizeof unknown->heard; id++) {
+        if (pdcp_unknown_silence(unknown, (uint8_t)id) < PDCP_UNKNOWN_QUIET) {
+            return true;
+        }
+    }
+    return false;
+}

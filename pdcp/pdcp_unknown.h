@@ -40,6 +40,9 @@ void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t 
 /* May the id be told to reset now? If so, it counts as told. */
 bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
 
+/* Was a frame heard on any id lately? */
+bool pdcp_unknown_any(const pdcp_unknown_t *unknown);
+
 /* Ticks since a frame was heard on this id, as of the last of the calls above; PDCP_UNKNOWN_QUIET: it is
  * quiet. */
 uint8_t pdcp_unknown_silence(const pdcp_unknown_t *unknown, uint8_t id);

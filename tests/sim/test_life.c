@@ -679,9 +679,9 @@ static void test_nothing_is_saved_on_standby(void)
         limb_run_ms(limb, 1);
     }
     TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(limb, 1, 1, 2, 1)); /* a change that is to be saved */
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 16; i++) {
         TEST_ASSERT_TRUE(sim_bus_send(&limb->world.bus, port, &beacon));
-        limb_run_ms(limb, 1000);
+        limb_run_ms(limb, 500);
     }
     TEST_ASSERT_EQUAL(1, limb->events[PDCP_EVENT_SILENT]);
     TEST_ASSERT_EQUAL(0, limb->app.limb.config.stored);

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pdcp_time.h"
 #include "unity.h"
 
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
@@ -58,7 +59,7 @@ void exchange_start(exchange_t *x, uint32_t now_ms)
     memset(x, 0, sizeof *x);
     x->now_ms = now_ms - PDCP_CLOSED_MS;
     x->arb = &alone;
-    pdcp_arb_init(x->arb, x->now_ms, 250, EXCHANGE_SEED, on_event, x);
+    pdcp_arb_init(x->arb, x->now_ms, EXCHANGE_SERIAL, EXCHANGE_SEED, on_event, x);
     pass_first_time(x);
 }
 
@@ -85,6 +86,17 @@ void exchange_step(exchange_t *x)
     }
 }
 
+/* Is a bind request held? */
+static bool is_held(const exchange_t *x)
+{
+    for (int i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (x->arb->bus.nodes.nodes[i].state == PDCP_NODE_ASKED) {
+            return true;
+        }
+    }
+    return false;
+}
+
 void exchange_rx(exchange_t *x, const char *text)
 {
     const can_frame_t frame = exchange_frame(text);
@@ -94,6 +106,9 @@ void exchange_rx(exchange_t *x, const char *text)
         (void)pdcp_arb_on_frame(x->arb, x->now_ms, &frame);
     }
     exchange_step(x);
+    if (pdcp_id_priority(frame.id) == PDCP_PRIORITY_BINDING && is_held(x)) {
+        exchange_pass(x, PDCP_HOLD_MS);
+    }
 }
 
 void exchange_tx(exchange_t *x, const char *text)
@@ -258,4 +273,22 @@ void exchange_beacons(exchange_t *x)
 {
     exchange_rx(x, "011#0A");
     exchange_rx(x, "012#0A");
+}
+
+void exchange_meet_server(exchange_t *x)
+{
+    for (int i = 0; i < PDCP_STANDBY_BEACONS; i++) {
+        exchange_rx(x, "100#0A");
+    }
+}
+
+void exchange_meet_rival(exchange_t *x)
+{
+    const uint32_t until_ms = x->now_ms + PDCP_YIELD_MS + EXCHANGE_SERIAL;
+    while (pdcp_time_before(x->now_ms, until_ms)) {
+        exchange_rx(x, "100#0A");
+        exchange_beacons(x);
+        exchange_pass(x, 500);
+    }
+    TEST_ASSERT_FALSE(x->arb->silent);
 }

@@ -7,7 +7,8 @@
 
 enum {
     EXCHANGE_EVENTS = 48,
-    EXCHANGE_SEED = 253 /* the first output gets id FEh, the next ones count downwards (D-BUS-36) */
+    EXCHANGE_SERIAL = 256, /* the arbitrator's: no spread but of the standby, which ends after 1856 ms */
+    EXCHANGE_SEED = 253    /* the first output gets id FEh, the next ones count downwards (D-BUS-36) */
 };
 
 typedef struct {
@@ -32,7 +33,8 @@ void exchange_step(exchange_t *x);
 
 can_frame_t exchange_frame(const char *text);
 
-/* A frame from the bus, then a step. */
+/* A frame from the bus, then a step. While the arbitrator has no device of its own it holds bind requests
+ * (D-BUS-42): then time moves on by PDCP_HOLD_MS. */
 void exchange_rx(exchange_t *x, const char *text);
 
 /* The next frame that leaves must be this one. */
@@ -40,6 +42,14 @@ void exchange_tx(exchange_t *x, const char *text);
 
 /* No frame leaves. */
 void exchange_silence(exchange_t *x);
+
+/* Another arbitrator shows that it serves (D-BUS-42): an arbitrator without devices of its own goes on
+ * standby. */
+void exchange_meet_server(exchange_t *x);
+
+/* Another arbitrator is heard for so long that this one, which has the devices below, goes on standby with
+ * its next beacon (D-BUS-42). */
+void exchange_meet_rival(exchange_t *x);
 
 /* Takes and forgets whatever leaves; returns how many frames. */
 int exchange_drain(exchange_t *x);

@@ -269,10 +269,10 @@ static void test_passthrough_to_all(void)
     exchange_silence(&x);
 }
 
-/* D-BUS-12: an arbitrator on standby sends nothing. */
+/* D-BUS-42: an arbitrator on standby sends nothing. */
 static void test_passthrough_to_all_on_standby(void)
 {
-    exchange_rx(&x, "100#0A");
+    exchange_meet_server(&x);
     TEST_ASSERT_TRUE(x.arb->silent);
     ask(0x230A, BYTES(0, 0, 0, 0, 0, 0, 1, 9, 0, 0, 0, 0, 0, 0, 0));
     expect_error(0x230C, 0x0B);
@@ -431,6 +431,7 @@ static void test_a_reset_behind_a_long_transfer(void)
 static void test_a_reset_and_the_standby(void)
 {
     exchange_add_output(&x, "FE");
+    exchange_meet_rival(&x);
     ask(0x230D, BYTES(0));
     exchange_rx(&x, "100#0A");
     expect(0x230F, BYTES(0, 0, 0, 0, 0, 0, 0, 0));

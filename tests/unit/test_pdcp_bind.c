@@ -69,10 +69,9 @@ static void test_a_suggested_id_is_reserved(void)
     exchange_tx(&x, "300#81 01 0100 0100 0100");
     exchange_rx(&x, "601#01 0200 0200 0200"); /* a stranger asks for it */
     exchange_tx(&x, "301#81 02 0200 0200 0200");
-    exchange_pass(&x, 999);
+    exchange_pass(&x, 989); /* and three requests are held for 5 ms (D-BUS-42) */
     exchange_rx(&x, "601#01 0300 0300 0300");
     exchange_tx(&x, "301#81 03 0300 0300 0300"); /* both are still reserved */
-    exchange_pass(&x, 1);
     exchange_rx(&x, "601#01 0300 0300 0300");
     exchange_tx(&x, "301#81 01 0300 0300 0300");
 }

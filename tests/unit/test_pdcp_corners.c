@@ -631,15 +631,16 @@ static void test_what_is_for_all_needs_room_and_an_arbitrator_that_speaks(void)
     fill_queue();
     TEST_ASSERT_FALSE(pdcp_arb_broadcast(x.arb, PDCP_SUSPEND, 0));
     (void)exchange_drain(&x);
-    exchange_rx(&x, "100#0A");
+    exchange_meet_server(&x);
     TEST_ASSERT_FALSE(pdcp_arb_broadcast(x.arb, PDCP_SUSPEND, 0));
     exchange_silence(&x);
 }
 
-/* D-BUS-12: a link that a device has asked for is nothing that the host waits for. */
+/* D-BUS-42: a link that a device has asked for is nothing that the host waits for. */
 static void test_going_silent_ends_a_devices_link_without_a_word(void)
 {
     add_two();
+    exchange_meet_rival(&x);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
     exchange_rx(&x, "100#0A");
@@ -651,6 +652,7 @@ static void test_going_silent_ends_a_devices_link_without_a_word(void)
 static void test_going_silent_ends_a_wish_that_has_not_begun(void)
 {
     add_two();
+    exchange_meet_rival(&x);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
     wish(0, 1);

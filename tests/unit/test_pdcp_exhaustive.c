@@ -127,7 +127,7 @@ static void test_every_frame_is_classified_and_changes_nothing(void)
 /* The same while the arbitrator is on standby: nothing but beacons of the other is even looked at. */
 static void test_on_standby_every_frame_is_classified(void)
 {
-    exchange_rx(&x, "100#0A");
+    exchange_meet_server(&x);
     before = tables();
     for (uint16_t id = 0; id <= CAN_FRAME_ID_MAX; id = (uint16_t)(id + ID_STEP)) {
         for (uint16_t code = 0; code < 16; code++) {

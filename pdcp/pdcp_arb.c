@@ -201,23 +201,32 @@ static bool is_reset_answer(const can_frame_t *frame)
     return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
 }
 
+/* Places in this state. */
+static uint8_t count_state(const pdcp_arb_t *arb, pdcp_node_state_t state)
+{
+    uint8_t places = 0;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        places = (uint8_t)(places + (arb->bus.nodes.nodes[i].state == (uint8_t)state));
+    }
+    return places;
+}
+
 /* Has it granted an id to a device (D-BUS-42)? */
 static bool has_own(const pdcp_arb_t *arb)
 {
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        const uint8_t state = arb->bus.nodes.nodes[i].state;
-        if (state != PDCP_NODE_FREE && state != PDCP_NODE_ASKED) {
-            return true;
-        }
-    }
-    return false;
+    return count_state(arb, PDCP_NODE_FREE) + count_state(arb, PDCP_NODE_ASKED) != PDCP_DEVICES_MAX;
+}
+
+static uint16_t own_hold_ms(const pdcp_arb_t *arb)
+{
+    return (uint16_t)(PDCP_HOLD_MS + arb->serial % PDCP_HOLD_SPREAD_MS);
 }
 
 /* How much longer the answer to a bind request is held that came now: another arbitrator may be there and
  * answer it (D-BUS-42). */
 static uint16_t hold_ms(const pdcp_arb_t *arb)
 {
-    const uint16_t own_ms = (uint16_t)(PDCP_HOLD_MS + arb->serial % PDCP_HOLD_SPREAD_MS);
+    const uint16_t own_ms = own_hold_ms(arb);
     const uint32_t heard_ms = arb->bus.now_ms - arb->standby.since_ms;
     const bool waits = pdcp_standby_is_heard(&arb->standby, arb->bus.now_ms) && !arb->standby.doubted;
     return waits && heard_ms < PDCP_HOLD_FOREIGN_MS ? (uint16_t)(own_ms + PDCP_HOLD_FOREIGN_MS - heard_ms)
@@ -259,18 +268,20 @@ static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked
     }
     pdcp_nodes_hold(&arb->bus.nodes, place, identity);
     node_of(arb, place)->asked_id = asked;
-    node_of(arb, place)->heard_ms = arb->bus.now_ms;
     set_life(arb, place, hold_ms(arb));
 }
 
-/* Nobody else has answered the request that is held. Others that came with it follow one after the other: set
- * up all at once they would only wait for each other. */
+/* Nobody else has answered the request that is held. Of many that came together a few are set up at once, the
+ * others follow one by one: they would only wait for each other. */
 static void on_held(pdcp_arb_t *arb, uint8_t place)
 {
     const pdcp_node_t held = *node_of(arb, place);
-    arb->held_ms = (uint16_t)(arb->bus.now_ms - held.heard_ms);
+    arb->held_ms = own_hold_ms(arb);
     drop_held(arb, place);
     bind(arb, &held.identity, held.asked_id);
+    if (count_state(arb, PDCP_NODE_SETUP) < PDCP_HOLD_SETUPS) {
+        return;
+    }
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         if (node_of(arb, i)->state == PDCP_NODE_ASKED) {
             set_life(arb, i, PDCP_HOLD_PACE_MS);

@@ -36,10 +36,11 @@ typedef struct {
     uint32_t asked_ms;  /* when a device asked to bind last, or the start */
     uint32_t beacon_ms; /* when its last beacon left */
     uint32_t serial;
-    uint16_t held_ms; /* so long was the last grant held; taken off the start-up's quiet time (D-BUS-34) */
-    bool silent;      /* on standby (D-BUS-42) */
-    bool listening;   /* its beacons did not leave for too long: it sends nothing for a while (D-BUS-42) */
-    bool restart;     /* the controller is to be restarted */
+    uint16_t
+        held_ms; /* the first grants were held for so long: taken off the start-up's quiet time (D-BUS-34) */
+    bool silent; /* on standby (D-BUS-42) */
+    bool listening; /* its beacons did not leave for too long: it sends nothing for a while (D-BUS-42) */
+    bool restart;   /* the controller is to be restarted */
     pdcp_host_request_t host;
     pdcp_bus_t bus;
     pdcp_recovery_t recovery;

@@ -102,7 +102,8 @@ enum {
     PDCP_FOREIGN_MS = 2000,         /* what was heard of another arbitrator counts so long (D-BUS-42) */
     PDCP_HOLD_MS = 5,               /* without devices of its own: bind requests are held, plus the spread */
     PDCP_HOLD_SPREAD_MS = 32,       /* by serial number (D-BUS-42) */
-    PDCP_HOLD_PACE_MS = 7,          /* between two of them: about what a setup takes */
+    PDCP_HOLD_SETUPS = 2,           /* of many that are held so many are set up at once, */
+    PDCP_HOLD_PACE_MS = 7,          /* and the others follow: about what a setup takes */
     PDCP_HOLD_FOREIGN_MS = 600,     /* and so long at least after a foreign beacon (D-BUS-42) */
     PDCP_YIELD_MS = 3000,        /* with devices of its own: goes on standby for another, plus the spread */
     PDCP_YIELD_SPREAD_MS = 2000, /* by serial number (D-BUS-42) */

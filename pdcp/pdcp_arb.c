@@ -44,6 +44,11 @@ void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t s
     forget_bus(arb);
 }
 
+void pdcp_arb_know(pdcp_arb_t *arb, pdcp_knows_fn knows)
+{
+    arb->bus.knows = knows;
+}
+
 static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
 {
     pdcp_bus_count(&arb->bus, stat);
@@ -148,6 +153,9 @@ static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
         take_down(arb, node); /* it was reset: what was known of its channels' state is gone */
     }
     begin_setup(arb, node);
+    if (!pdcp_bind_is_known(&arb->bus, &node_of(arb, node)->identity)) {
+        set_life(arb, node, PDCP_GHOST_MS);
+    }
 }
 
 static void start_host_request(pdcp_arb_t *arb)
@@ -605,6 +613,7 @@ static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
         expect_life(arb, node);
     }
     if (device->state == PDCP_NODE_READY) {
+        pdcp_bind_on_ready(&arb->bus, device);
         pdcp_link_on_ready(&arb->bus, node);
     } else if (device->state == PDCP_NODE_FAILED) {
         arb->bus.link.due = true; /* an Update Data Channel may have waited for it */
@@ -786,6 +795,15 @@ static void forget(pdcp_arb_t *arb, uint8_t node)
     pdcp_nodes_remove(&arb->bus.nodes, node);
 }
 
+/* Was an identity that is not known granted an id, and is not there (D-BUS-43)? Only its bind request was
+ * ever heard. */
+static bool is_ghost(const pdcp_arb_t *arb, const pdcp_node_t *device, uint32_t unheard_ms)
+{
+    return device->state == PDCP_NODE_SETUP && device->setup_pass == 0 && device->setup_step == 0 &&
+           !device->beaconed && !device->asked_again && unheard_ms >= PDCP_GHOST_MS &&
+           !pdcp_bind_is_known(&arb->bus, &device->identity);
+}
+
 static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
@@ -793,6 +811,9 @@ static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
     if (device->state == PDCP_NODE_ASKED) {
         on_held(arb, node);
     } else if (device->state == PDCP_NODE_LOST) {
+        forget(arb, node);
+    } else if (is_ghost(arb, device, unheard_ms)) {
+        pdcp_request_cancel(&arb->bus, node);
         forget(arb, node);
     } else if (unheard_ms < silence_ms(device)) {
         set_life(arb, node, (uint16_t)(silence_ms(device) - unheard_ms));

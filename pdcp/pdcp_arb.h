@@ -53,6 +53,10 @@ typedef struct {
 void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t seed, pdcp_event_fn on_event,
                    void *ctx);
 
+/* Who is known from a stored limb keeps its place when strangers crowd in (D-BUS-43). knows gets the ctx of
+ * on_event. */
+void pdcp_arb_know(pdcp_arb_t *arb, pdcp_knows_fn knows);
+
 /* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. True:
  * it may have led to something, pdcp_arb_step is to be called. False: nothing is due earlier than before; so
  * it is with the most frequent frames, beacons and channel data. */

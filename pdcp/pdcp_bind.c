@@ -1,5 +1,6 @@
 #include "pdcp_bind.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "pdcp_bus.h"
@@ -204,12 +205,39 @@ static pdcp_bind_result_t offer(pdcp_bus_t *bus, const pdcp_identity_t *identity
         return PDCP_BIND_SUGGESTED;
     }
     answer(bus, identity, asked, id, PDCP_STAT_BIND_GRANTED);
-    const uint8_t old = remembered_id(&bus->bind, identity);
-    remember(&bus->bind, identity, id);
-    if (old != id) { /* order alone is not worth a write to non-volatile memory */
-        pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
+    if (remembered_id(&bus->bind, identity) == id) {
+        remember(&bus->bind, identity, id); /* it is the one used last; order alone is not worth a write */
     }
     return PDCP_BIND_GRANTED;
+}
+
+void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_node_t *device)
+{
+    if (remembered_id(&bus->bind, &device->identity) != device->node_id) {
+        remember(&bus->bind, &device->identity, device->node_id);
+        pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
+    }
+}
+
+bool pdcp_bind_is_known(const pdcp_bus_t *bus, const pdcp_identity_t *identity)
+{
+    return remembered_id(&bus->bind, identity) != 0 ||
+           (bus->knows != NULL && bus->knows(bus->event_ctx, identity));
+}
+
+/* Have identities that are not known as many places as they may (D-BUS-43)? */
+static bool is_crowded(const pdcp_bus_t *bus)
+{
+    uint8_t places = 0;
+    if (pdcp_bus_age_ms(bus) < PDCP_CROWD_MS) {
+        return false;
+    }
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        const pdcp_node_t *node = &bus->nodes.nodes[i];
+        places =
+            (uint8_t)(places + (node->state != PDCP_NODE_FREE && !pdcp_bind_is_known(bus, &node->identity)));
+    }
+    return places >= PDCP_UNKNOWN_PLACES;
 }
 
 pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
@@ -226,7 +254,10 @@ pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *
         return PDCP_BIND_CHECK;
     }
     /* Without a place nothing is given back. With one, an id that is reserved is there to be had. */
-    const uint8_t place = pdcp_nodes_free_place(&bus->nodes);
+    uint8_t place = pdcp_nodes_free_place(&bus->nodes);
+    if (!pdcp_bind_is_known(bus, identity) && is_crowded(bus)) {
+        place = PDCP_NONE;
+    }
     const uint8_t id = place != PDCP_NONE ? choose_id(bus, identity, asked) : 0;
     if (id == 0) {
         answer(bus, identity, asked, PDCP_NODE_REFUSED, PDCP_STAT_BIND_REFUSED);

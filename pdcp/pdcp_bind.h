@@ -14,6 +14,7 @@
 
 struct pdcp_bus;
 struct pdcp_channel;
+struct pdcp_node;
 
 typedef struct {
     pdcp_identity_t identity;
@@ -51,6 +52,13 @@ void pdcp_bind_init(pdcp_bind_t *bind, uint32_t seed);
  * first. Entries with an invalid or already remembered id, a repeated identity, or beyond the room are left
  * out: false. */
 bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry);
+
+/* Is the identity remembered, or part of a stored limb? Others are kept out when places become few
+ * (D-BUS-43). */
+bool pdcp_bind_is_known(const struct pdcp_bus *bus, const pdcp_identity_t *identity);
+
+/* A device is set up: it is remembered with its id (D-BUS-43). */
+void pdcp_bind_on_ready(struct pdcp_bus *bus, const struct pdcp_node *device);
 
 /* Frees reservations that are over; to be called every few days at least. */
 void pdcp_bind_on_time(struct pdcp_bus *bus);

@@ -43,6 +43,9 @@ typedef struct {
  * the arbitrator but to read its tables; the event is valid during the call. */
 typedef void (*pdcp_event_fn)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
 
+/* Is this identity part of a limb that is stored? Same context as pdcp_event_fn; NULL stands for: of none. */
+typedef bool (*pdcp_knows_fn)(void *ctx, const pdcp_identity_t *identity);
+
 /* Small state stands first here and in the structs around it: on the smallest part, a field that lies farther
  * than 511 bytes from the beginning costs twice the instructions. */
 typedef struct pdcp_bus {
@@ -50,6 +53,7 @@ typedef struct pdcp_bus {
     uint32_t started_ms;  /* slides along behind: see pdcp_bus_age_ms */
     uint32_t silenced_ms; /* when an output answered last that it is not enabled any more */
     pdcp_event_fn on_event;
+    pdcp_knows_fn knows;
     void *event_ctx;
     pdcp_link_t link;
     pdcp_nodes_t nodes;

@@ -24,7 +24,7 @@ typedef enum {
     PDCP_NODE_ASKED   /* its bind request is held (D-BUS-42): neither node id nor channels yet */
 } pdcp_node_state_t;
 
-typedef struct {
+typedef struct pdcp_node {
     pdcp_identity_t identity;
     uint16_t type;
     uint16_t profile;

@@ -118,6 +118,8 @@ enum {
     PDCP_CLOSED_MS = 500,   /* first time of an arbitrator: no output is enabled (D-BUS-36) */
     PDCP_SHUT_MS = 11000,   /* and if an unknown id is heard in it: no output id is given (D-BUS-36) */
     PDCP_FADING_MS = 100,   /* a disabled output may send what it has queued (D-BUS-36) */
+    PDCP_CROWD_MS = 600,    /* unknown identities may take all places (D-BUS-43) */
+    PDCP_GHOST_MS = 300,    /* one of them that is not heard after its grant is forgotten (D-BUS-43) */
     PDCP_AGE_MAX_MS = 20000 /* longer than any time that is counted from the start */
 };
 

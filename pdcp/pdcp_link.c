@@ -19,6 +19,9 @@ typedef enum {
     STEP_END
 } step_t;
 
+/* What only silences a channel. */
+#define SILENCES ((unsigned)PDCP_TODO_SILENCE | (unsigned)PDCP_TODO_AGAIN)
+
 void pdcp_link_init(pdcp_bus_t *bus)
 {
     const bool planned = bus->link.planned;
@@ -50,13 +53,24 @@ static bool is_unconnected(const pdcp_channel_t *input)
     return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
 }
 
-/* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing
- * to be made. */
+/* What is no longer to be done, because it was done or something else does it, too. */
+static void drop_todo(pdcp_channel_t *channel, unsigned todo)
+{
+    channel->todo = (uint8_t)(channel->todo & ~todo);
+}
+
+/* Notes what is to be done. A silence that is needed is never forgotten: what was noted before stays, until
+ * its own job begins or a job that silences the input, too, whatever comes of it. Making a link begins with
+ * the input off, and silences it again when it fails or cannot start. Taking one away silences the input, and
+ * leaves nothing to be made. */
 static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (channel->todo != PDCP_TODO_REMOVE) {
-        channel->todo = (uint8_t)todo;
+    channel->todo = (uint8_t)(channel->todo | (unsigned)todo);
+    if ((channel->todo & PDCP_TODO_REMOVE) != 0) {
+        channel->todo = PDCP_TODO_REMOVE;
+    } else if ((channel->todo & PDCP_TODO_CONNECT) != 0) {
+        drop_todo(channel, SILENCES);
     }
     bus->link.due = true;
 }
@@ -145,7 +159,7 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
         }
         input->feed = find_source(bus, input);
         const uint8_t source = owner_of(bus, input->feed);
-        if (source == PDCP_NONE || input->todo == PDCP_TODO_UPDATE) {
+        if (source == PDCP_NONE || (input->todo & PDCP_TODO_UPDATE) != 0) {
             continue;
         }
         if (node == PDCP_NONE || input->node == node || source == node) {
@@ -160,6 +174,7 @@ void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[input];
     channel->link = PDCP_LINK_INACTIVE;
+    drop_todo(channel, PDCP_TODO_CONNECT);
     put_todo(bus, input, PDCP_TODO_SILENCE);
     release_output(bus, channel->feed);
     pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, PDCP_OK);
@@ -294,7 +309,7 @@ static void tell_outcome(pdcp_bus_t *bus)
 static void silence_again(pdcp_bus_t *bus, uint8_t number)
 {
     const pdcp_channel_t *channel = channel_of(bus, number);
-    if (channel != NULL && channel->enabled && channel->todo == PDCP_TODO_NONE) {
+    if (channel != NULL && channel->enabled) {
         put_todo(bus, number, PDCP_TODO_AGAIN);
     }
 }
@@ -328,7 +343,8 @@ static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
 static void settle_made(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     input->link = PDCP_LINK_ACTIVE;
-    release_output(bus, bus->link.old_feed); /* unless it is the same: that one is needed */
+    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* noted while it was being made */
+    release_output(bus, bus->link.old_feed);        /* unless it is the same: that one is needed */
 }
 
 static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -608,14 +624,13 @@ void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     run(bus);
 }
 
-/* Starts the job that a channel has to do, if it can be done now. */
-static void start_todo(pdcp_bus_t *bus, uint8_t number)
+/* Starts a job that a channel has to do, if it can be done now. */
+static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
     uint8_t input = number;
     uint8_t output = PDCP_NONE;
-    channel->todo = PDCP_TODO_NONE;
+    drop_todo(channel, todo == PDCP_TODO_SILENCE ? SILENCES : (unsigned)todo);
     if (todo == PDCP_TODO_CONNECT) {
         output = find_source(bus, channel);
         channel->feed = output;
@@ -652,7 +667,7 @@ static void start_wish(pdcp_bus_t *bus)
         pdcp_link_forget_wish(bus, PDCP_OK);
         return;
     }
-    input->todo = PDCP_TODO_NONE;
+    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* it begins with the input off */
     begin(bus, PDCP_TODO_CONNECT, bus->link.wish_input, bus->link.wish_output);
     bus->link.for_host = true;
     bus->link.wish_input = PDCP_NONE;
@@ -660,18 +675,19 @@ static void start_wish(pdcp_bus_t *bus)
 
 /* What is to be done next, PDCP_TODO_NONE: nothing, and for which channel: what silences comes before what
  * connects. */
-static uint8_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
+static pdcp_todo_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
 {
-    uint8_t best = PDCP_TODO_NONE;
+    unsigned best = PDCP_TODO_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *channel = &bus->nodes.channels[i];
-        if (channel->todo != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || channel->todo < best) &&
+        const unsigned lowest = channel->todo & (0u - channel->todo);
+        if (lowest != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || lowest < best) &&
             bus->nodes.nodes[channel->node].state != PDCP_NODE_SETUP) {
-            best = channel->todo;
+            best = lowest;
             *number = i;
         }
     }
-    return best;
+    return (pdcp_todo_t)best;
 }
 
 /* Is there something to be done, other than to silence again? */
@@ -681,7 +697,7 @@ static bool has_work(const pdcp_bus_t *bus)
     if (bus->link.wish_input != PDCP_NONE) {
         return true;
     }
-    const uint8_t todo = bus->link.due ? next_todo(bus, &number) : (uint8_t)PDCP_TODO_NONE;
+    const pdcp_todo_t todo = bus->link.due ? next_todo(bus, &number) : PDCP_TODO_NONE;
     return todo != PDCP_TODO_NONE && todo != PDCP_TODO_AGAIN;
 }
 
@@ -715,11 +731,11 @@ void pdcp_link_step(pdcp_bus_t *bus)
     run(bus);
     while (!bus->link.active && bus->link.due) {
         uint8_t number = PDCP_NONE;
-        const uint8_t todo = next_todo(bus, &number);
+        const pdcp_todo_t todo = next_todo(bus, &number);
         if (bus->link.wish_input != PDCP_NONE && todo != PDCP_TODO_SILENCE && todo != PDCP_TODO_REMOVE) {
             start_wish(bus);
         } else if (todo != PDCP_TODO_NONE) {
-            start_todo(bus, number);
+            start_todo(bus, number, todo);
         } else {
             bus->link.due = false;
         }

@@ -56,15 +56,16 @@ typedef enum {
     PDCP_LINK_ACTIVE = 2    /* its last write is answered */
 } pdcp_link_status_t;
 
-/* What still has to be written to a channel; carried out by pdcp_link.c, lowest first. */
+/* What still has to be written to a channel: a set of these bits. pdcp_link.c carries it out, the lowest bit
+ * first. */
 typedef enum {
     PDCP_TODO_NONE = 0,
-    PDCP_TODO_SILENCE, /* input: its source is lost, not enabled, no node ids (D-BUS-14); output: not enabled,
-                          nobody listens */
-    PDCP_TODO_REMOVE,  /* input: back to unconnected */
-    PDCP_TODO_CONNECT, /* input: make the link to the source that it has */
-    PDCP_TODO_UPDATE,  /* input: its device has sent Update Data Channel */
-    PDCP_TODO_AGAIN    /* silence it: the write before was not answered, and everybody else comes first */
+    PDCP_TODO_SILENCE = 1, /* input: its source is lost, not enabled, no node ids (D-BUS-14); output: not
+                              enabled, nobody listens */
+    PDCP_TODO_REMOVE = 2,  /* input: back to unconnected */
+    PDCP_TODO_CONNECT = 4, /* input: make the link to the source that it has */
+    PDCP_TODO_UPDATE = 8,  /* input: its device has sent Update Data Channel */
+    PDCP_TODO_AGAIN = 16   /* silence it: the write before was not answered, and everybody else comes first */
 } pdcp_todo_t;
 
 typedef struct {
@@ -76,7 +77,7 @@ typedef struct {
     uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
     uint8_t node_id;  /* outputs: 0 = none yet */
     bool enabled;     /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
-    uint8_t todo;     /* pdcp_todo_t */
+    uint8_t todo;     /* a set of pdcp_todo_t */
     /* Inputs only: */
     uint8_t link;         /* pdcp_link_status_t */
     uint8_t feed;         /* channel number of the source, PDCP_NONE: it is not on the bus */

@@ -106,13 +106,14 @@ static void release_output(pdcp_bus_t *bus, uint8_t output)
     }
 }
 
-pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
+pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input, bool sole)
 {
     if (bus->link.wish_input != PDCP_NONE) {
         return PDCP_ERR_BUSY;
     }
     bus->link.wish_input = input;
     bus->link.wish_output = output;
+    bus->link.wish_sole = sole;
     bus->link.due = true;
     return PDCP_OK;
 }
@@ -665,6 +666,11 @@ static void start_wish(pdcp_bus_t *bus)
     }
     if (input->link == PDCP_LINK_ACTIVE && input->feed == bus->link.wish_output) {
         pdcp_link_forget_wish(bus, PDCP_OK);
+        return;
+    }
+    if (bus->link.wish_sole &&
+        pdcp_nodes_rival(&bus->nodes, bus->link.wish_output, bus->link.wish_input) != PDCP_NONE) {
+        pdcp_link_forget_wish(bus, PDCP_ERR_SOLE); /* another link was made while this one waited */
         return;
     }
     drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* it begins with the input off */

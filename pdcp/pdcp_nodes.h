@@ -141,6 +141,11 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
 /* No input is fed by this channel any more: it is gone, or no output now. */
 void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
 
+/* The input that keeps this one, which must be another's, from the output, because both want it for
+ * themselves (D-API-13); PDCP_NONE: there is none. An inactive link counts, since it comes back, but less
+ * than one that works; so does that which the input itself has to this output. */
+uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
+
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
 void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id);
 

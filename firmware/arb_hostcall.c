@@ -63,6 +63,8 @@ uint8_t arb_call_error(int8_t status)
         return ARB_ERR_BULK;
     case PDCP_ERR_BUSY:
         return ARB_ERR_BUSY;
+    case PDCP_ERR_SOLE:
+        return ARB_ERR_SOLE_ACCESS;
     default:
         return ARB_ERR_NO_ANSWER;
     }

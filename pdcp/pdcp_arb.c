@@ -1046,7 +1046,7 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb)
     return restart;
 }
 
-pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+static pdcp_status_t connect(pdcp_arb_t *arb, uint8_t output, uint8_t input, bool sole)
 {
     const pdcp_channel_t *channels = arb->bus.nodes.channels;
     if (output >= PDCP_CHANNELS_MAX || input >= PDCP_CHANNELS_MAX ||
@@ -1056,7 +1056,20 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
     if (channels[output].node == channels[input].node) {
         return PDCP_ERR_OWN;
     }
-    return pdcp_link_wish(&arb->bus, output, input);
+    if (sole && pdcp_nodes_rival(&arb->bus.nodes, output, input) != PDCP_NONE) {
+        return PDCP_ERR_SOLE;
+    }
+    return pdcp_link_wish(&arb->bus, output, input, sole);
+}
+
+pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+{
+    return connect(arb, output, input, false);
+}
+
+pdcp_status_t pdcp_arb_connect_sole(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+{
+    return connect(arb, output, input, true);
 }
 
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)

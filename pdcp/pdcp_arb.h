@@ -83,6 +83,11 @@ pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8
  * way. */
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input);
 
+/* The same with respect for sole access, for a host: PDCP_ERR_SOLE while pdcp_nodes_rival names an input that
+ * is in the way. The event has that status if there is one when the link has its turn. (A plan keeps sole
+ * access as a whole; until it is carried out, an output may have its new input beside the old one.) */
+pdcp_status_t pdcp_arb_connect_sole(pdcp_arb_t *arb, uint8_t output, uint8_t input);
+
 /* Takes the link of an input away (pdcp-bus.md 8); PDCP_EVENT_LINK tells when that is done. False: it has
  * none. */
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input);

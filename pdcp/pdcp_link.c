@@ -20,6 +20,9 @@ typedef enum {
     STEP_END
 } step_t;
 
+/* What only silences a channel. */
+#define SILENCES ((unsigned)PDCP_TODO_SILENCE | (unsigned)PDCP_TODO_AGAIN)
+
 void pdcp_link_init(pdcp_bus_t *bus)
 {
     const bool planned = bus->link.planned;
@@ -52,13 +55,24 @@ static bool is_unconnected(const pdcp_channel_t *input)
     return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
 }
 
-/* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing
- * to be made. */
+/* What is no longer to be done, because it was done or something else does it, too. */
+static void drop_todo(pdcp_channel_t *channel, unsigned todo)
+{
+    channel->todo = (uint8_t)(channel->todo & ~todo);
+}
+
+/* Notes what is to be done. A silence that is needed is never forgotten: what was noted before stays, until
+ * its own job begins or a job that silences the input, too, whatever comes of it. Making a link begins with
+ * the input off, and silences it again when it fails or cannot start. Taking one away silences the input, and
+ * leaves nothing to be made. */
 static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (channel->todo != PDCP_TODO_REMOVE) {
-        channel->todo = (uint8_t)todo;
+    channel->todo = (uint8_t)(channel->todo | (unsigned)todo);
+    if ((channel->todo & PDCP_TODO_REMOVE) != 0) {
+        channel->todo = PDCP_TODO_REMOVE;
+    } else if ((channel->todo & PDCP_TODO_CONNECT) != 0) {
+        drop_todo(channel, SILENCES);
     }
     bus->link.due = true;
 }
@@ -94,13 +108,14 @@ static void release_output(pdcp_bus_t *bus, uint8_t output)
     }
 }
 
-pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
+pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input, bool sole)
 {
     if (bus->link.wish_input != PDCP_NONE) {
         return PDCP_ERR_BUSY;
     }
     bus->link.wish_input = input;
     bus->link.wish_output = output;
+    bus->link.wish_sole = sole;
     bus->link.due = true;
     return PDCP_OK;
 }
@@ -147,7 +162,7 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
         }
         input->feed = find_source(bus, input);
         const uint8_t source = owner_of(bus, input->feed);
-        if (source == PDCP_NONE || input->todo == PDCP_TODO_UPDATE) {
+        if (source == PDCP_NONE || (input->todo & PDCP_TODO_UPDATE) != 0) {
             continue;
         }
         if (node == PDCP_NONE || input->node == node || source == node) {
@@ -162,6 +177,7 @@ void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[input];
     channel->link = PDCP_LINK_INACTIVE;
+    drop_todo(channel, PDCP_TODO_CONNECT);
     put_todo(bus, input, PDCP_TODO_SILENCE);
     release_output(bus, channel->feed);
     pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, PDCP_OK);
@@ -301,7 +317,7 @@ static void tell_outcome(pdcp_bus_t *bus)
 static void silence_again(pdcp_bus_t *bus, uint8_t number)
 {
     const pdcp_channel_t *channel = channel_of(bus, number);
-    if (channel != NULL && channel->enabled && channel->todo == PDCP_TODO_NONE) {
+    if (channel != NULL && channel->enabled) {
         put_todo(bus, number, PDCP_TODO_AGAIN);
     }
 }
@@ -335,7 +351,8 @@ static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
 static void settle_made(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     input->link = PDCP_LINK_ACTIVE;
-    release_output(bus, bus->link.old_feed); /* unless it is the same: that one is needed */
+    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* noted while it was being made */
+    release_output(bus, bus->link.old_feed);        /* unless it is the same: that one is needed */
 }
 
 static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -665,14 +682,13 @@ void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     run(bus);
 }
 
-/* Starts the job that a channel has to do, if it can be done now. */
-static void start_todo(pdcp_bus_t *bus, uint8_t number)
+/* Starts a job that a channel has to do, if it can be done now. */
+static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
     uint8_t input = number;
     uint8_t output = PDCP_NONE;
-    channel->todo = PDCP_TODO_NONE;
+    drop_todo(channel, todo == PDCP_TODO_SILENCE ? SILENCES : (unsigned)todo);
     if (todo == PDCP_TODO_CONNECT) {
         output = find_source(bus, channel);
         channel->feed = output;
@@ -709,7 +725,12 @@ static void start_wish(pdcp_bus_t *bus)
         pdcp_link_forget_wish(bus, PDCP_OK);
         return;
     }
-    input->todo = PDCP_TODO_NONE;
+    if (bus->link.wish_sole &&
+        pdcp_nodes_rival(&bus->nodes, bus->link.wish_output, bus->link.wish_input) != PDCP_NONE) {
+        pdcp_link_forget_wish(bus, PDCP_ERR_SOLE); /* another link was made while this one waited */
+        return;
+    }
+    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* it begins with the input off */
     begin(bus, PDCP_TODO_CONNECT, bus->link.wish_input, bus->link.wish_output);
     bus->link.for_host = true;
     bus->link.wish_input = PDCP_NONE;
@@ -717,18 +738,19 @@ static void start_wish(pdcp_bus_t *bus)
 
 /* What is to be done next, PDCP_TODO_NONE: nothing, and for which channel: what silences comes before what
  * connects. */
-static uint8_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
+static pdcp_todo_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
 {
-    uint8_t best = PDCP_TODO_NONE;
+    unsigned best = PDCP_TODO_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *channel = &bus->nodes.channels[i];
-        if (channel->todo != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || channel->todo < best) &&
+        const unsigned lowest = channel->todo & (0u - channel->todo);
+        if (lowest != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || lowest < best) &&
             bus->nodes.nodes[channel->node].state != PDCP_NODE_SETUP) {
-            best = channel->todo;
+            best = lowest;
             *number = i;
         }
     }
-    return best;
+    return (pdcp_todo_t)best;
 }
 
 /* Is there something to be done, other than to silence again? */
@@ -738,7 +760,7 @@ static bool has_work(const pdcp_bus_t *bus)
     if (bus->link.wish_input != PDCP_NONE) {
         return true;
     }
-    const uint8_t todo = bus->link.due ? next_todo(bus, &number) : (uint8_t)PDCP_TODO_NONE;
+    const pdcp_todo_t todo = bus->link.due ? next_todo(bus, &number) : PDCP_TODO_NONE;
     return todo != PDCP_TODO_NONE && todo != PDCP_TODO_AGAIN;
 }
 
@@ -772,11 +794,11 @@ void pdcp_link_step(pdcp_bus_t *bus)
     run(bus);
     while (!bus->link.active && bus->link.due) {
         uint8_t number = PDCP_NONE;
-        const uint8_t todo = next_todo(bus, &number);
+        const pdcp_todo_t todo = next_todo(bus, &number);
         if (bus->link.wish_input != PDCP_NONE && todo != PDCP_TODO_SILENCE && todo != PDCP_TODO_REMOVE) {
             start_wish(bus);
         } else if (todo != PDCP_TODO_NONE) {
-            start_todo(bus, number);
+            start_todo(bus, number, todo);
         } else {
             bus->link.due = false;
         }

@@ -33,9 +33,10 @@ typedef struct {
     uint8_t output; /* channel number; PDCP_NONE: gone, or the job has none */
     bool output_was_on; /* before the job */
     int8_t status;      /* outcome so far, pdcp_status_t */
-    /* The link that the host has asked for; wish_input PDCP_NONE: none. */
+    /* The link that the host or the planner has asked for; wish_input PDCP_NONE: none. */
     uint8_t wish_input;
     uint8_t wish_output;
+    bool wish_sole; /* not if another input keeps it from the output */
     /* The input's source before the job, to be restored when it fails. */
     uint8_t old_index;
     uint8_t old_link;
@@ -55,8 +56,8 @@ bool pdcp_link_is_settled(const struct pdcp_bus *bus);
 void pdcp_link_rest(struct pdcp_bus *bus, uint8_t input);
 
 /* Asks for exactly this link. PDCP_OK: the outcome comes as PDCP_EVENT_WISH. PDCP_ERR_BUSY: another wish is
- * under way. */
-pdcp_status_t pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input);
+ * under way. sole: if sole access forbids it when its turn comes, it ends with PDCP_ERR_SOLE. */
+pdcp_status_t pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input, bool sole);
 
 /* A wish that has not been started ends with status. Nothing happens when there is none. */
 void pdcp_link_forget_wish(struct pdcp_bus *bus, pdcp_status_t status);

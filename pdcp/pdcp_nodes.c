@@ -294,6 +294,31 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
     return false;
 }
 
+/* Status of the link that an input has to an output; PDCP_LINK_NONE: it has none, or not to this one. */
+static uint8_t link_to(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, uint8_t output)
+{
+    const pdcp_channel_t *source = &nodes->channels[output];
+    if (input->source_index != source->index ||
+        !pdcp_identity_equal(&input->source, &nodes->nodes[source->node].identity)) {
+        return PDCP_LINK_NONE;
+    }
+    return input->link;
+}
+
+uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
+{
+    const pdcp_channel_t *asked = &nodes->channels[input];
+    const uint8_t own = link_to(nodes, asked, output);
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *other = &nodes->channels[i];
+        if (other != asked && (other->type & asked->type & PDCP_TYPE_SOLE) != 0 &&
+            link_to(nodes, other, output) > own) {
+            return i;
+        }
+    }
+    return PDCP_NONE;
+}
+
 /* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE:
  * there are fewer. number 0: how many there are. */
 static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)

@@ -33,7 +33,8 @@ typedef enum {
     PDCP_ERR_BULK = -3,    /* transfer failed PDCP_BULK_RESTARTS times, or the value is longer than allowed */
     PDCP_ERR_BUSY = -4,    /* not now: try again later */
     PDCP_ERR_UNKNOWN = -5, /* no such device or channel, or wrong direction */
-    PDCP_ERR_OWN = -6      /* an output never feeds an input of its own device (D-API-6) */
+    PDCP_ERR_OWN = -6,     /* an output never feeds an input of its own device (D-API-6) */
+    PDCP_ERR_SOLE = -7     /* another input wants the output for itself, as this one does (D-API-13) */
 } pdcp_status_t;
 
 typedef enum {

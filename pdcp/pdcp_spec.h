@@ -70,6 +70,10 @@ enum {
 /* Transfer type, parameter 3 of a channel. */
 enum { PDCP_INPUT = 1, PDCP_OUTPUT = 2 };
 
+/* The one bit of an input's type that is not the profile layer's alone: it wants its source for itself, no
+ * other such input may have the same one [PROFILE listing 4.9]. */
+#define PDCP_TYPE_SOLE 0x0200u
+
 /* Source of an unconnected input (D-BUS-7). */
 enum { PDCP_NO_SOURCE_INDEX = 0xFF };
 #define PDCP_NO_SOURCE_WORD 0xFFFFu

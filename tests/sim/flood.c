@@ -221,10 +221,10 @@ static void ask_for_links(flood_t *flood)
 {
     limb_t *limb = &flood->limb;
     limb->answer_len = 0;
-    for (uint8_t number = 1; number <= FLOOD_LINKS + 1; number++) {
+    for (int number = 1; number <= FLOOD_LINKS + 1; number++) {
         uint8_t bytes[ARB_HOST_HEADER + 1 + ARB_HOST_CRC];
-        bytes[ARB_HOST_HEADER] = number;
-        const uint16_t len = arb_host_finish(bytes, ARB_MSG_LINK_INFO, number, 1);
+        bytes[ARB_HOST_HEADER] = (uint8_t)number;
+        const uint16_t len = arb_host_finish(bytes, ARB_MSG_LINK_INFO, (uint8_t)number, 1);
         (void)arb_app_on_bytes(&limb->app, sim_world_ms(&limb->world), bytes, len);
     }
     sim_world_touch_app(&limb->world);

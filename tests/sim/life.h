@@ -152,6 +152,7 @@ typedef struct {
     uint32_t differs_ms[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1]; /* since when a flag does */
     uint32_t twins_ms[256];                                     /* since when an id is two parts' */
     uint32_t twins_seen_ms[256];
+    bool twins_pass[256]; /* nobody could have known */
 } life_watch_t;
 
 /* The limb has all its parts. From now on the watch is told of the values that they take. */

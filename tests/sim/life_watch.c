@@ -16,6 +16,7 @@ enum {
      * then waits for the next beacon (1500 ms at most in a life), whose Reset comes a second later if the
      * first one was lost (D-BUS-15). */
     TWINS_MS = 1200 + 1500 + 1000,
+    CHECK_MS = 1000, /* an identity check, with its repetition and the bind requests around it (D-BUS-41) */
     LOOK_MS = 50,
     NOBODY = 0xFFFF,
     WHY = 100,
@@ -63,6 +64,12 @@ static bool is_bound(const life_watch_t *watch, int part)
 static uint32_t calm_ms(const life_watch_t *watch, int part)
 {
     return watch->rough_ms[part] > watch->all_rough_ms ? watch->rough_ms[part] : watch->all_rough_ms;
+}
+
+void life_watch_rough(life_watch_t *watch, int part, uint32_t until_ms)
+{
+    uint32_t *const rough_ms = part < 0 ? &watch->all_rough_ms : &watch->rough_ms[part];
+    *rough_ms = until_ms > *rough_ms ? until_ms : *rough_ms;
 }
 
 static void complain(int part, unsigned channel, const char *why)
@@ -261,26 +268,41 @@ static void check_flags(life_watch_t *watch)
     }
 }
 
+static bool have_one_identity(const life_watch_t *watch, int a, int b)
+{
+    return pdcp_identity_equal(&watch->limb->parts[a].ini->desc.identity,
+                               &watch->limb->parts[b].ini->desc.identity);
+}
+
+/* Two have one id. Those with one identity who met while one of them could not be heard cannot be told apart
+ * by anybody (D-BUS-41): while they last, nothing is expected of them. */
+static void note_twins(life_watch_t *watch, uint8_t id, int a, int b)
+{
+    const uint32_t now_ms = watch->now_ms;
+    const uint32_t rough_ms = calm_ms(watch, a) > calm_ms(watch, b) ? calm_ms(watch, a) : calm_ms(watch, b);
+    if (watch->twins_seen_ms[id] + LOOK_MS < now_ms) { /* they are new */
+        watch->twins_ms[id] = now_ms;
+        watch->twins_pass[id] =
+            have_one_identity(watch, a, b) && rough_ms != 0 && !is_over(now_ms, rough_ms, 0, CHECK_MS);
+    }
+    watch->twins_seen_ms[id] = now_ms;
+    if (watch->twins_pass[id]) {
+        life_watch_rough(watch, a, now_ms);
+        life_watch_rough(watch, b, now_ms);
+    } else if (is_over(now_ms, watch->twins_ms[id], rough_ms, TWINS_MS)) {
+        char why[WHY];
+        (void)snprintf(why, sizeof why, "has id %u, and so has part %d", id, b + 1);
+        complain(a, 0, why);
+    }
+}
+
 /* One more has this id, as its own or that of an enabled output. */
 static void note_id(life_watch_t *watch, int owners[256], uint8_t id, int part)
 {
-    if (id == 0) {
-        return;
-    }
-    if (owners[id] < 0) {
+    if (id != 0 && owners[id] >= 0) {
+        note_twins(watch, id, part, owners[id]);
+    } else if (id != 0) {
         owners[id] = part;
-        return;
-    }
-    if (watch->twins_seen_ms[id] + LOOK_MS < watch->now_ms) {
-        watch->twins_ms[id] = watch->now_ms; /* they are new */
-    }
-    watch->twins_seen_ms[id] = watch->now_ms;
-    const uint32_t a_ms = calm_ms(watch, part);
-    const uint32_t b_ms = calm_ms(watch, owners[id]);
-    if (is_over(watch->now_ms, watch->twins_ms[id], a_ms > b_ms ? a_ms : b_ms, TWINS_MS)) {
-        char why[WHY];
-        (void)snprintf(why, sizeof why, "has id %u, and so has part %d", id, owners[id] + 1);
-        complain(part, 0, why);
     }
 }
 
@@ -328,12 +350,6 @@ void life_watch_calm(const life_watch_t *watch)
 }
 
 /* --- What the life tells --- */
-
-void life_watch_rough(life_watch_t *watch, int part, uint32_t until_ms)
-{
-    uint32_t *const rough_ms = part < 0 ? &watch->all_rough_ms : &watch->rough_ms[part];
-    *rough_ms = until_ms > *rough_ms ? until_ms : *rough_ms;
-}
 
 void life_watch_calm_down(life_watch_t *watch, uint32_t now_ms)
 {

@@ -52,6 +52,7 @@ typedef struct {
     uint32_t loose_until[ALL_MAX];
     int parts; /* those after them are clones */
     uint32_t loss_percent;
+    uint32_t lose_in; /* frames, until one is lost; 0: none will be */
     int foreign_port;
     bool is_off; /* the bus, for the arbitrator's controller */
     bool watching;
@@ -82,6 +83,7 @@ enum {
     TWINS,
     CLONES_COME,
     LOOSE_PLUGS,
+    LOST_FRAMES,
     RESTARTS,
     FORGED_FLAGS,
     FORGED_SOURCES,
@@ -101,6 +103,7 @@ static struct {
     [TWINS] = {"twins", false},
     [CLONES_COME] = {"clones", false},
     [LOOSE_PLUGS] = {"loose", false},
+    [LOST_FRAMES] = {"lost", false},
     [RESTARTS] = {"restarts", false},
     [FORGED_FLAGS] = {"enabled", false},
     [FORGED_SOURCES] = {"source", false},
@@ -227,7 +230,7 @@ static bool line_loses(void *ctx, const can_frame_t *frame)
 {
     (void)ctx;
     if (is_during(life.black_until) || (is_during(life.bad_until) && chance(100) < life.loss_percent) ||
-        is_muted(frame)) {
+        is_muted(frame) || (life.lose_in != 0 && --life.lose_in == 0)) {
         return true;
     }
     life_watch_frame(&life.watch, frame);
@@ -444,6 +447,14 @@ static bool is_plugged(int part)
     return life.limb.parts[part].node != NULL;
 }
 
+/* One frame is lost: all that matters is repeated, and a limb must not notice. */
+static void lose_one(void)
+{
+    if (is_on(LOST_FRAMES)) {
+        life.lose_in = 1 + chance(10);
+    }
+}
+
 static void plug_or_pull_clone(void)
 {
     const int clone = life.parts + (int)chance(CLONES);
@@ -452,6 +463,7 @@ static void plug_or_pull_clone(void)
         limb_power_off(&life.limb, clone);
     } else {
         limb_power_on(&life.limb, clone);
+        lose_one();
     }
 }
 
@@ -568,13 +580,14 @@ static const struct {
               {2, turn_deaf, SWITCHES},
               {2, close_host, SWITCHES},
               {1, meet_another, SWITCHES},
-              {6, plug_or_pull_clone, CLONES_COME},
-              {6, loosen_plug, LOOSE_PLUGS},
+              {8, plug_or_pull_clone, CLONES_COME},
+              {8, loosen_plug, LOOSE_PLUGS},
+              {8, lose_one, LOST_FRAMES},
               {3, restart, RESTARTS},
-              {2, forge_flag, FORGED_FLAGS},
-              {2, forge_source, FORGED_SOURCES},
-              {2, forge_suspend, FORGED_SUSPENDS},
-              {2, forge_reset, FORGED_RESETS},
+              {4, forge_flag, FORGED_FLAGS},
+              {6, forge_source, FORGED_SOURCES},
+              {3, forge_suspend, FORGED_SUSPENDS},
+              {3, forge_reset, FORGED_RESETS},
               {2, beacon_of_unknown, UNKNOWN_BEACONS},
               {1, beacon_of_another, FOREIGN_BEACONS}};
 
@@ -713,9 +726,20 @@ static void storm(void)
     }
 }
 
+/* A last word of those who forge: nothing else that happens mends what it does. */
+static void forge_at_last(void)
+{
+    for (unsigned k = 0; k < sizeof events / sizeof events[0]; k++) {
+        if (events[k].number >= FORGED_FLAGS && events[k].number < SWITCHES && is_on(events[k].number)) {
+            events[k].happens();
+        }
+    }
+}
+
 /* Nothing fails any more. */
 static void end_storm(void)
 {
+    forge_at_last();
     uint32_t *const lasts[] = {&life.off_until,  &life.black_until, &life.bad_until,  &life.foreign_until,
                                &life.deaf_until, &life.gone_until,  &life.busy_until, &life.worn_until};
     for (unsigned i = 0; i < sizeof lasts / sizeof lasts[0]; i++) {

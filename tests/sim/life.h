@@ -152,7 +152,10 @@ typedef struct {
     uint32_t differs_ms[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1]; /* since when a flag does */
     uint32_t twins_ms[256];                                     /* since when an id is two parts' */
     uint32_t twins_seen_ms[256];
-    bool twins_pass[256]; /* nobody could have known */
+    uint32_t requests[LIFE_PARTS_MAX]; /* to bind, that a part has sent */
+    uint32_t bound_ms[LIFE_PARTS_MAX]; /* since when it is bound */
+    bool twins_pass[256];              /* nobody could have known */
+    bool met[LIFE_PARTS_MAX];          /* a part has had its id together with its clone */
 } life_watch_t;
 
 /* The limb has all its parts. From now on the watch is told of the values that they take. */

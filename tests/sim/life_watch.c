@@ -16,7 +16,6 @@ enum {
      * then waits for the next beacon (1500 ms at most in a life), whose Reset comes a second later if the
      * first one was lost (D-BUS-15). */
     TWINS_MS = 1200 + 1500 + 1000,
-    CHECK_MS = 1000, /* an identity check, with its repetition and the bind requests around it (D-BUS-41) */
     LOOK_MS = 50,
     NOBODY = 0xFFFF,
     WHY = 100,
@@ -274,22 +273,35 @@ static bool have_one_identity(const life_watch_t *watch, int a, int b)
                                &watch->limb->parts[b].ini->desc.identity);
 }
 
-/* Two have one id. Those with one identity who met while one of them could not be heard cannot be told apart
- * by anybody (D-BUS-41): while they last, nothing is expected of them. */
+/* Nobody can tell apart who has one identity and got one id at the same instant (both take an answer), or
+ * while one of them could not be heard (D-BUS-41); nor those who were such twins once, since both ask for
+ * that id. */
+static bool is_excused(const life_watch_t *watch, int a, int b, uint32_t rough_ms)
+{
+    const uint32_t a_ms = watch->bound_ms[a];
+    const uint32_t b_ms = watch->bound_ms[b];
+    const uint32_t apart_ms = a_ms > b_ms ? a_ms - b_ms : b_ms - a_ms;
+    return have_one_identity(watch, a, b) &&
+           (watch->met[a] || apart_ms <= LOOK_MS ||
+            (rough_ms != 0 && !is_over(watch->now_ms, rough_ms, 0, TWINS_MS)));
+}
+
+/* Two have one id. Of those who are excused nothing is expected while they last. */
 static void note_twins(life_watch_t *watch, uint8_t id, int a, int b)
 {
     const uint32_t now_ms = watch->now_ms;
+    const uint32_t limit_ms = have_one_identity(watch, a, b) ? 0 : TWINS_MS;
     const uint32_t rough_ms = calm_ms(watch, a) > calm_ms(watch, b) ? calm_ms(watch, a) : calm_ms(watch, b);
     if (watch->twins_seen_ms[id] + LOOK_MS < now_ms) { /* they are new */
         watch->twins_ms[id] = now_ms;
-        watch->twins_pass[id] =
-            have_one_identity(watch, a, b) && rough_ms != 0 && !is_over(now_ms, rough_ms, 0, CHECK_MS);
+        watch->twins_pass[id] = is_excused(watch, a, b, rough_ms);
+        watch->met[a] = watch->met[a] || watch->twins_pass[id];
     }
     watch->twins_seen_ms[id] = now_ms;
     if (watch->twins_pass[id]) {
         life_watch_rough(watch, a, now_ms);
         life_watch_rough(watch, b, now_ms);
-    } else if (is_over(now_ms, watch->twins_ms[id], rough_ms, TWINS_MS)) {
+    } else if (is_over(now_ms, watch->twins_ms[id], rough_ms, limit_ms)) {
         char why[WHY];
         (void)snprintf(why, sizeof why, "has id %u, and so has part %d", id, b + 1);
         complain(a, 0, why);
@@ -312,10 +324,16 @@ static void check_ids(life_watch_t *watch)
     memset(owners, 0xFF, sizeof owners);
     for (int part = 0; part < watch->limb->count; part++) {
         if (!is_bound(watch, part)) {
+            watch->requests[part] = 0;
             continue;
         }
         const pdcp_device_t *device = device_of(watch, part);
         const pdcp_device_desc_t *desc = &watch->limb->parts[part].ini->desc;
+        const uint32_t requests = pdcp_device_stats(device)->bind_requests;
+        if (watch->requests[part] != requests) {
+            watch->requests[part] = requests;
+            watch->bound_ms[part] = watch->now_ms;
+        }
         note_id(watch, owners, pdcp_device_node_id(device), part);
         for (uint8_t i = 1; i <= desc->channel_count; i++) {
             const pdcp_device_channel_t *channel = pdcp_device_channel(device, i);

@@ -329,8 +329,9 @@ static void plug_or_pull(void)
 
 static void mute(void)
 {
+    const uint32_t until_ms = life.ms + 50 + chance(3000);
     const int part = (int)chance((uint32_t)life.limb.count);
-    life.mute_until[part] = life.ms + 50 + chance(3000);
+    life.mute_until[part] = until_ms;
     life_watch_rough(&life.watch, part, life.mute_until[part]);
 }
 

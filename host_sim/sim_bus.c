@@ -86,6 +86,7 @@ void sim_bus_init(sim_bus_t *bus)
 {
     memset(bus, 0, sizeof *bus);
     bus->sender = -1;
+    bus->delivering = -1;
     bus->idle = true;
 }
 
@@ -97,6 +98,7 @@ int sim_bus_attach(sim_bus_t *bus, sim_bus_receive_t receive, void *ctx)
         if (!port->attached) {
             port->attached = true;
             port->joining = bus->sender >= 0;
+            port->cut = false;
             port->queued = 0;
             port->receive = receive;
             port->ctx = ctx;
@@ -112,17 +114,37 @@ static bool is_attached(const sim_bus_t *bus, int port)
     return port >= 0 && port < SIM_BUS_PORTS_MAX && bus->ports[port].attached;
 }
 
+/* The port's frames compete no longer. */
+static void withdraw_frames(sim_bus_t *bus, int port)
+{
+    bus->waiting -= bus->ports[port].cut ? 0u : bus->ports[port].queued;
+    if (bus->waiting == 0 && bus->sender < 0) {
+        bus->idle = true; /* the step that waited for the interframe space has nothing left to start */
+    }
+}
+
 void sim_bus_detach(sim_bus_t *bus, int port)
 {
     if (!is_attached(bus, port)) {
         return;
     }
+    withdraw_frames(bus, port);
     bus->ports[port].attached = false;
-    bus->waiting -= bus->ports[port].queued;
     bus->ports[port].queued = 0;
-    if (bus->waiting == 0 && bus->sender < 0) {
-        bus->idle = true; /* the step that waited for the interframe space has nothing left to start */
+}
+
+void sim_bus_cut(sim_bus_t *bus, int port, bool cut)
+{
+    if (!is_attached(bus, port) || bus->ports[port].cut == cut) {
+        return;
     }
+    if (cut) {
+        withdraw_frames(bus, port);
+    } else {
+        bus->waiting += bus->ports[port].queued;
+        bus->ports[port].joining = bus->sender >= 0;
+    }
+    bus->ports[port].cut = cut;
 }
 
 bool sim_bus_send(sim_bus_t *bus, int port, const can_frame_t *frame)
@@ -138,7 +160,7 @@ bool sim_bus_send(sim_bus_t *bus, int port, const can_frame_t *frame)
     }
     queue[place] = *frame;
     bus->ports[port].queued++;
-    bus->waiting++;
+    bus->waiting += bus->ports[port].cut ? 0u : 1u;
     return true;
 }
 
@@ -149,7 +171,7 @@ static void start_frame(sim_bus_t *bus)
     unsigned lowest = 0;
 
     for (int i = 0; i < bus->ports_end; i++) {
-        if (bus->ports[i].queued > 0) {
+        if (bus->ports[i].queued > 0 && !bus->ports[i].cut) {
             unsigned offered = rank(&bus->ports[i].queue[0]);
 
             if (winner < 0 || offered < lowest) {
@@ -176,15 +198,17 @@ static void deliver_frame(sim_bus_t *bus)
     bus->idle_from_us = bus->frame_end_us + SIM_BUS_INTERFRAME_BITS;
     bus->frames++;
     bus->sender = -1;
+    bus->delivering = sender;
     const bool lost = bus->fault != NULL && bus->fault(bus->fault_ctx, &bus->on_wire);
     for (int i = 0; i < bus->ports_end; i++) {
         sim_bus_port_t *port = &bus->ports[i];
 
-        if (port->attached && !port->joining && !lost && i != sender && port->receive != NULL) {
+        if (port->attached && !port->joining && !port->cut && !lost && i != sender && port->receive != NULL) {
             port->receive(port->ctx, bus->frame_end_us, &bus->on_wire);
         }
         port->joining = false;
     }
+    bus->delivering = -1;
 }
 
 uint64_t sim_bus_step(sim_bus_t *bus, uint64_t now_us)

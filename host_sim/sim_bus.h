@@ -39,6 +39,7 @@ typedef void (*sim_bus_receive_t)(void *ctx, uint64_t time_us, const can_frame_t
 typedef struct {
     bool attached;
     bool joining; /* attached while a frame was on the wire: does not hear that one */
+    bool cut;     /* its plug is loose: hears and sends nothing, keeps its queue */
     uint8_t queued;
     can_frame_t queue[SIM_BUS_QUEUE_MAX]; /* sorted: what leaves first stands first */
     sim_bus_receive_t receive;
@@ -48,12 +49,13 @@ typedef struct {
 /* A fault of the line: true means that nobody receives this frame (its sender believes that it was sent). */
 typedef bool (*sim_bus_fault_t)(void *ctx, const can_frame_t *frame);
 
-/* To be read by everybody, written by sim_bus.c alone. About 22 KB. */
+/* To be read by everybody, written by sim_bus.c alone (but for the fault). About 22 KB. */
 typedef struct {
     sim_bus_port_t ports[SIM_BUS_PORTS_MAX];
     int ports_end; /* no port from here on has ever been attached */
     can_frame_t on_wire;
     int sender;            /* port of the frame on the wire; -1: none is */
+    int delivering;        /* port of the frame that is being delivered, inside callbacks; otherwise -1 */
     bool idle;             /* the last step found nothing under way and nothing waiting */
     uint32_t waiting;      /* frames in all queues */
     uint64_t frame_end_us; /* end of the last bit of the frame on the wire */
@@ -74,6 +76,11 @@ int sim_bus_attach(sim_bus_t *bus, sim_bus_receive_t receive, void *ctx);
 /* Removes a port. Its waiting frames are forgotten; the one on the wire is still delivered to the others.
  * Does nothing when the port is not attached. */
 void sim_bus_detach(sim_bus_t *bus, int port);
+
+/* Cuts a port's line, or mends it. A port that is cut hears nothing and takes no part in arbitration; its
+ * queue fills and is sent when the line is mended, as a controller sends what nobody acknowledged. Its frame
+ * that is on the wire just now still arrives. Does nothing when the port is not attached. */
+void sim_bus_cut(sim_bus_t *bus, int port, bool cut);
 
 /* Copies a frame into the port's queue. False: the queue is full or the port is not attached. Frames that are
  * not of the kind CAN_FRAME_BASE travel as well, each with its own bit time. */

@@ -12,6 +12,8 @@ struct sim_node {
     pdcp_device_port_t port;
     sim_node_event_fn_t on_event;
     void *ctx;
+    sim_node_taken_fn_t on_taken;
+    void *taken_ctx;
     uint64_t start_us;
     uint64_t now_us;                           /* of the call that is running */
     bool streaming[PDCP_DEVICE_CHANNELS_MAX];  /* outputs: was able to send at the last step */
@@ -109,6 +111,9 @@ static void emit(sim_node_t *node, sim_node_event_t *event)
 static void on_input(void *ctx, uint8_t channel, const uint8_t *data, uint8_t len)
 {
     sim_node_t *node = ctx;
+    if (node->on_taken != NULL) {
+        node->on_taken(node->taken_ctx, channel);
+    }
     node->received[channel - 1] = true;
     node->last_len[channel - 1] = len;
     memcpy(node->last[channel - 1], data, len);
@@ -190,6 +195,12 @@ sim_node_t *sim_node_open(const node_ini_t *ini, uint32_t seed, uint64_t now_us,
         return NULL;
     }
     return node;
+}
+
+void sim_node_on_taken(sim_node_t *node, sim_node_taken_fn_t on_taken, void *ctx)
+{
+    node->on_taken = on_taken;
+    node->taken_ctx = ctx;
 }
 
 void sim_node_close(sim_node_t *node)

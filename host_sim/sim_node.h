@@ -32,10 +32,16 @@ typedef struct {
 
 typedef void (*sim_node_event_fn_t)(void *ctx, const sim_node_event_t *event);
 
+/* An input, terminal or not, has taken a value. */
+typedef void (*sim_node_taken_fn_t)(void *ctx, uint8_t channel);
+
 /* Switches a device on. ini must outlive it; on_event may be NULL and must not call functions of this header.
  * NULL: error[] holds one line that names the state file and the reason. The caller owns the result. */
 sim_node_t *sim_node_open(const node_ini_t *ini, uint32_t seed, uint64_t now_us, sim_node_event_fn_t on_event,
                           void *ctx, char *error, size_t error_size);
+
+/* Sets who is told of every value that an input takes, before it is passed on; NULL: nobody. */
+void sim_node_on_taken(sim_node_t *node, sim_node_taken_fn_t on_taken, void *ctx);
 
 /* Keeps what is to be kept and frees the device. */
 void sim_node_close(sim_node_t *node);

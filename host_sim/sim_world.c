@@ -71,6 +71,25 @@ void sim_world_remove(sim_world_t *world, sim_node_t *node)
     }
 }
 
+void sim_world_cut(sim_world_t *world, const sim_node_t *node, bool cut)
+{
+    for (int i = 0; i < SIM_WORLD_NODES_MAX; i++) {
+        if (node != NULL && world->members[i].node == node) {
+            sim_bus_cut(&world->bus, world->members[i].port, cut);
+        }
+    }
+}
+
+const sim_node_t *sim_world_node_at(const sim_world_t *world, int port)
+{
+    for (int i = 0; i < SIM_WORLD_NODES_MAX; i++) {
+        if (world->members[i].node != NULL && world->members[i].port == port) {
+            return world->members[i].node;
+        }
+    }
+    return NULL;
+}
+
 bool sim_world_set_app(sim_world_t *world, arb_app_t *app)
 {
     if (world->app != NULL) {

@@ -43,6 +43,12 @@ void sim_world_init(sim_world_t *world, uint64_t now_us, uint32_t clock_ms);
 bool sim_world_add(sim_world_t *world, sim_node_t *node);
 void sim_world_remove(sim_world_t *world, sim_node_t *node);
 
+/* A device's plug is loose (cut), or has contact again: its power stays on (sim_bus_cut). */
+void sim_world_cut(sim_world_t *world, const sim_node_t *node, bool cut);
+
+/* The device at a port of the bus; NULL: somebody else's, or none. */
+const sim_node_t *sim_world_node_at(const sim_world_t *world, int port);
+
 /* Puts an arbitrator, already initialised at sim_world_ms, on the bus, or takes it off (NULL). Its port's
  * can_send must be sim_world_send for this world. False: no port is left. */
 bool sim_world_set_app(sim_world_t *world, arb_app_t *app);

@@ -118,6 +118,64 @@ int life_memory_count(const life_memory_t *memory);
 /* Is this a string that a reader must take, by profile-layer.md 5? */
 bool life_memory_is_good(const uint8_t *string, uint16_t len);
 
+/* --- What must be true at any time (life_watch.c) --- */
+
+/* An audit's turn (D-BUS-40): what tables and devices do not agree about is mended within it. */
+enum { LIFE_AUDIT_MS = 40000 };
+
+enum { LIFE_PARTS_MAX = 12, LIFE_CHANNELS_MAX = 8, LIFE_RECENT = 4 };
+
+/* A source that an input had. */
+typedef struct {
+    uint16_t key; /* part and channel */
+    uint32_t until_ms;
+} life_source_t;
+
+typedef struct {
+    /* What is looked for. */
+    bool values; /* an input takes values of a part that is not, and was not just now, its source */
+    bool flags;  /* transfer enabled differs between tables and device for longer than LIFE_AUDIT_MS */
+    bool twins;  /* two devices, or enabled outputs, have one id */
+    /* The rest is its own. */
+    const limb_t *limb;
+    uint32_t now_ms; /* of the life */
+    uint32_t taken;  /* values judged */
+    uint32_t all_rough_ms;
+    uint32_t rough_ms[LIFE_PARTS_MAX];
+    bool cut[LIFE_PARTS_MAX];                                  /* set by the life: its plug is loose */
+    bool suspended[LIFE_PARTS_MAX];                            /* by the host */
+    bool ready[LIFE_PARTS_MAX];                                /* in the tables */
+    uint32_t forged_ms[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1]; /* set by the life: somebody has forged its
+                                                                  source, which excuses it until then */
+    uint16_t named[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1];     /* sources in the tables */
+    life_source_t recent[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1][LIFE_RECENT];
+    uint32_t differs_ms[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1]; /* since when a flag does */
+    uint32_t twins_ms[256];                                     /* since when an id is two parts' */
+    uint32_t twins_seen_ms[256];
+    uint32_t requests[LIFE_PARTS_MAX]; /* to bind, that a part has sent */
+    uint32_t bound_ms[LIFE_PARTS_MAX]; /* since when it is bound */
+    bool twins_pass[256];              /* nobody could have known */
+    bool met[LIFE_PARTS_MAX];          /* a part has had its id together with its clone */
+} life_watch_t;
+
+/* The limb has all its parts. From now on the watch is told of the values that they take. */
+void life_watch_init(life_watch_t *watch, limb_t *limb);
+
+/* A frame is about to be delivered. */
+void life_watch_frame(life_watch_t *watch, const can_frame_t *frame);
+
+/* Every millisecond. */
+void life_watch_ms(life_watch_t *watch, uint32_t now_ms);
+
+/* Until then a part (-1: all of them) may not hear or not answer: what it is to be told takes longer. */
+void life_watch_rough(life_watch_t *watch, int part, uint32_t until_ms);
+
+/* All that ends now. */
+void life_watch_calm_down(life_watch_t *watch, uint32_t now_ms);
+
+/* When all has been calm: nobody is suspended but by the host. */
+void life_watch_calm(const life_watch_t *watch);
+
 /* --- Invariants (life_check.c) --- */
 
 typedef struct {

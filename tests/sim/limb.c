@@ -102,6 +102,15 @@ static void on_value(void *ctx, const sim_node_event_t *event)
     part->value[event->channel] = event->value;
 }
 
+static void on_taken(void *ctx, uint8_t channel)
+{
+    const limb_part_t *part = ctx;
+    limb_t *limb = part->limb;
+    if (limb->on_taken != NULL) {
+        limb->on_taken(limb->taken_ctx, (int)(part - limb->parts), channel);
+    }
+}
+
 /* Where files of this limb lie; it is made when it is needed. */
 static void file_name(limb_t *limb, char path[PATH_TEXT], int part, const char *extension)
 {
@@ -212,6 +221,7 @@ void limb_power_on(limb_t *limb, int device)
     const uint32_t seed = limb->seed + (uint32_t)(device + 1) * 977u + (uint32_t)limb->world.now_us;
     part->node = sim_node_open(part->ini, seed, limb->world.now_us, on_value, part, error, sizeof error);
     TEST_ASSERT_NOT_NULL_MESSAGE(part->node, error);
+    sim_node_on_taken(part->node, on_taken, part);
     TEST_ASSERT_TRUE(sim_world_add(&limb->world, part->node));
 }
 
@@ -220,6 +230,22 @@ void limb_power_off(limb_t *limb, int device)
     sim_world_remove(&limb->world, limb->parts[device].node);
     sim_node_close(limb->parts[device].node);
     limb->parts[device].node = NULL;
+}
+
+void limb_cut(limb_t *limb, int device, bool cut)
+{
+    sim_world_cut(&limb->world, limb->parts[device].node, cut);
+}
+
+int limb_part_at(const limb_t *limb, int port)
+{
+    const sim_node_t *node = sim_world_node_at(&limb->world, port);
+    for (int i = 0; node != NULL && i < limb->count; i++) {
+        if (limb->parts[i].node == node) {
+            return i;
+        }
+    }
+    return -1;
 }
 
 void limb_plug(limb_t *limb, int first, int last)

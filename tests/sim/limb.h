@@ -22,6 +22,10 @@ typedef struct {
 
 typedef struct limb limb_t;
 
+/* An input of a part, terminal or not, takes a value. The frame is being delivered: limb->world.bus.on_wire,
+ * and .delivering is its sender's port. */
+typedef void (*limb_taken_fn_t)(void *ctx, int part, uint8_t input);
+
 typedef struct {
     limb_t *limb;
     node_ini_t *ini;
@@ -42,7 +46,9 @@ struct limb {
     limb_part_t parts[LIMB_PARTS_MAX];
     int count;
     uint32_t seed;
-    bool keeps;                      /* parts keep their writable parameters over power-off */
+    bool keeps;               /* parts keep their writable parameters over power-off */
+    limb_taken_fn_t on_taken; /* set by whoever wants to know; NULL: nobody */
+    void *taken_ctx;
     char folder[64];                 /* where; "": not made yet */
     uint8_t last[PDCP_NODE_MAX + 1]; /* first byte of the data that an output's node id has sent last */
     uint32_t events[PDCP_EVENT_REQUEST + 1]; /* how often each kind has come */
@@ -75,6 +81,12 @@ void limb_power_on(limb_t *limb, int device);
 void limb_power_off(limb_t *limb, int device);
 void limb_plug(limb_t *limb, int first, int last); /* several */
 void limb_pull(limb_t *limb, int first, int last);
+
+/* The plug of a part is loose, or has contact again; its power stays on. */
+void limb_cut(limb_t *limb, int device, bool cut);
+
+/* The part whose port of the bus this is; -1: it is nobody's, or somebody else's. */
+int limb_part_at(const limb_t *limb, int port);
 
 /* A part that is not plugged in forgets its parameters. */
 void limb_blank(limb_t *limb, int device);

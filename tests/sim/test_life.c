@@ -2,8 +2,8 @@
  * fail, another arbitrator appears, the power goes, and a host asks whatever can be asked. Then all is calm,
  * and everything must be in order.
  *
- * test_life [FIRST [COUNT]] lives the lives with the seeds from FIRST on; LIFE_COUNT in the environment is
- * another way to live more of them. */
+ * test_life [--with=NAME,...] [FIRST [COUNT]] lives the lives with the seeds from FIRST on; LIFE_COUNT in the
+ * environment is another way to live more of them. --with switches on more that happens and is looked for. */
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -18,9 +18,14 @@ enum {
     CALM_MS = 40000, /* whatever is tried again after a while has been */
     WATCH_MS = 2500,
     PARTS_MAX = 8,
+    CLONES = 2, /* of the first parts */
+    ALL_MAX = PARTS_MAX + CLONES,
     CHANNELS_MAX = 6,
     REFUSED = 240, /* [parameter] of each part that stands for what it refuses */
     LONG_VALUE = 241,
+    RECOVERY_MS =
+        3200, /* longest pause after a black-out until the controller is on again (PDCP_RECOVERY_MS) */
+    STANDBY_MS = 3000, /* an arbitrator is silent so long after another's beacon, at most (D-BUS-12) */
     TEXT = 2000
 };
 
@@ -29,6 +34,7 @@ typedef struct {
     life_host_t host;
     life_memory_t memory;
     life_counters_t counters;
+    life_watch_t watch;
     life_random_t random;
     uint32_t seed;
     uint32_t ms;         /* of this life */
@@ -41,9 +47,12 @@ typedef struct {
     uint32_t deaf_until;    /* the host does not read */
     uint32_t gone_until;    /* the host has closed */
     uint32_t worn_until;    /* the memory fails or is slow */
-    uint32_t mute_until[PARTS_MAX];
-    uint32_t refuse_until[PARTS_MAX];
+    uint32_t mute_until[ALL_MAX];
+    uint32_t refuse_until[ALL_MAX];
+    uint32_t loose_until[ALL_MAX];
+    int parts; /* those after them are clones */
     uint32_t loss_percent;
+    uint32_t lose_in; /* frames, until one is lost; 0: none will be */
     int foreign_port;
     bool is_off; /* the bus, for the arbitrator's controller */
     bool watching;
@@ -65,7 +74,74 @@ static uint32_t chance(uint32_t below)
     return life_random(&life.random, below);
 }
 
+/* --- What is looked for and what happens, one by one --- */
+
+/* Switched on by --with=NAME,NAME or --with=all. Without it a life is what it was before there were these. */
+enum {
+    VALUES,
+    FLAGS,
+    TWINS,
+    CLONES_COME,
+    LOOSE_PLUGS,
+    LOST_FRAMES,
+    RESTARTS,
+    FORGED_FLAGS,
+    FORGED_SOURCES,
+    FORGED_SUSPENDS,
+    FORGED_RESETS,
+    UNKNOWN_BEACONS,
+    FOREIGN_BEACONS,
+    SWITCHES
+};
+
+static struct {
+    const char *name;
+    bool on;
+} switches[SWITCHES] = {
+    [VALUES] = {"values", false},
+    [FLAGS] = {"flags", false},
+    [TWINS] = {"twins", false},
+    [CLONES_COME] = {"clones", false},
+    [LOOSE_PLUGS] = {"loose", false},
+    [LOST_FRAMES] = {"lost", false},
+    [RESTARTS] = {"restarts", false},
+    [FORGED_FLAGS] = {"enabled", false},
+    [FORGED_SOURCES] = {"source", false},
+    [FORGED_SUSPENDS] = {"suspend", false},
+    [FORGED_RESETS] = {"reset", false},
+    [UNKNOWN_BEACONS] = {"unknown", false},
+    [FOREIGN_BEACONS] = {"foreign", false},
+};
+
+static bool is_on(int number)
+{
+    return switches[number].on;
+}
+
+static bool is_listed(const char *list, const char *name)
+{
+    const size_t len = strlen(name);
+    for (const char *at = strstr(list, name); at != NULL; at = strstr(at + 1, name)) {
+        if ((at == list || at[-1] == ',') && (at[len] == ',' || at[len] == '\0')) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static void switch_on(const char *list)
+{
+    for (int i = 0; i < SWITCHES; i++) {
+        switches[i].on = switches[i].on || strcmp(list, "all") == 0 || is_listed(list, switches[i].name);
+    }
+}
+
 /* --- Parts --- */
+
+static struct {
+    char channels[TEXT];
+    char more[TEXT];
+} clones[CLONES];
 
 static int put_channel(char *text, size_t size, int index, bool is_output, bool is_controller,
                        unsigned inputs)
@@ -117,6 +193,18 @@ static void add_part(int number)
                    100 + chance(900), 20 + chance(200), REFUSED, LONG_VALUE,
                    chance(8) == 0 ? "[parameter 8 1]\nvalue = x\n" : "");
     (void)limb_add_with(&life.limb, (uint16_t)(number + 1), channels, more);
+    if (is_on(CLONES_COME) && number < CLONES) {
+        (void)snprintf(clones[number].channels, sizeof clones[number].channels, "%s", channels);
+        (void)snprintf(clones[number].more, sizeof clones[number].more, "%s", more);
+    }
+}
+
+/* Parts with the identities of others. */
+static void add_clones(void)
+{
+    for (int i = 0; is_on(CLONES_COME) && i < CLONES; i++) {
+        (void)limb_add_with(&life.limb, (uint16_t)(i + 1), clones[i].channels, clones[i].more);
+    }
 }
 
 /* --- The world around the arbitrator --- */
@@ -141,8 +229,12 @@ static bool is_muted(const can_frame_t *frame)
 static bool line_loses(void *ctx, const can_frame_t *frame)
 {
     (void)ctx;
-    return is_during(life.black_until) || (is_during(life.bad_until) && chance(100) < life.loss_percent) ||
-           is_muted(frame);
+    if (is_during(life.black_until) || (is_during(life.bad_until) && chance(100) < life.loss_percent) ||
+        is_muted(frame) || (life.lose_in != 0 && --life.lose_in == 0)) {
+        return true;
+    }
+    life_watch_frame(&life.watch, frame);
+    return false;
 }
 
 static void on_frame(void *ctx, uint64_t time_us, const can_frame_t *frame)
@@ -193,6 +285,7 @@ static void start_arbitrator(void)
     arb_app_observe(&life.limb.app, NULL, NULL);
     memset(&life.counters, 0, sizeof life.counters);
     life.is_off = false;
+    life_watch_rough(&life.watch, -1, life.ms);
     TEST_ASSERT_EQUAL_MESSAGE(life_memory_count(&life.memory), life.limb.app.limb.config.stored,
                               "configurations after the start");
 }
@@ -208,9 +301,17 @@ static void stop_arbitrator(uint32_t for_ms)
 
 /* --- Events --- */
 
+/* The plug of a part has contact again. */
+static void mend_plug(int part)
+{
+    life.loose_until[part] = 0;
+    life.watch.cut[part] = false;
+    limb_cut(&life.limb, part, false);
+}
+
 static void plug_or_pull(void)
 {
-    const int part = (int)chance((uint32_t)life.limb.count);
+    const int part = (int)chance((uint32_t)life.parts);
     const bool again = chance(3) == 0;
     if (life.limb.parts[part].node == NULL) {
         if (chance(4) == 0) {
@@ -219,6 +320,7 @@ static void plug_or_pull(void)
         limb_power_on(&life.limb, part);
         return;
     }
+    mend_plug(part);
     limb_power_off(&life.limb, part);
     if (again) {
         limb_power_on(&life.limb, part); /* it has forgotten that it was bound */
@@ -227,7 +329,10 @@ static void plug_or_pull(void)
 
 static void mute(void)
 {
-    life.mute_until[chance((uint32_t)life.limb.count)] = life.ms + 50 + chance(3000);
+    const uint32_t until_ms = life.ms + 50 + chance(3000);
+    const int part = (int)chance((uint32_t)life.limb.count);
+    life.mute_until[part] = until_ms;
+    life_watch_rough(&life.watch, part, life.mute_until[part]);
 }
 
 static node_ini_t *ini_of(int part)
@@ -254,6 +359,7 @@ static void refuse(void)
     extra->param = param;
     extra->channel = channel;
     life.refuse_until[part] = life.ms + 100 + chance(6000);
+    life_watch_rough(&life.watch, part, life.refuse_until[part]);
 }
 
 static void end_refusals(void)
@@ -270,11 +376,13 @@ static void spoil_line(void)
 {
     life.bad_until = life.ms + 100 + chance(4000);
     life.loss_percent = 2 + chance(40);
+    life_watch_rough(&life.watch, -1, life.bad_until);
 }
 
 static void black_out(void)
 {
     life.black_until = life.ms + 20 + chance(2500);
+    life_watch_rough(&life.watch, -1, life.black_until + RECOVERY_MS);
 }
 
 static void wear_memory(void)
@@ -330,25 +438,175 @@ static void close_host(void)
 static void meet_another(void)
 {
     life.foreign_until = life.ms + 100 + chance(4000);
+    life_watch_rough(&life.watch, -1, life.foreign_until + STANDBY_MS);
+}
+
+/* --- Events that are switched on --- */
+
+static bool is_plugged(int part)
+{
+    return life.limb.parts[part].node != NULL;
+}
+
+/* One frame is lost: all that matters is repeated, and a limb must not notice. */
+static void lose_one(void)
+{
+    if (is_on(LOST_FRAMES)) {
+        life.lose_in = 1 + chance(10);
+    }
+}
+
+static void plug_or_pull_clone(void)
+{
+    const int clone = life.parts + (int)chance(CLONES);
+    if (is_plugged(clone)) {
+        mend_plug(clone);
+        limb_power_off(&life.limb, clone);
+    } else {
+        limb_power_on(&life.limb, clone);
+        lose_one();
+    }
+}
+
+/* Its power stays on; often for so long that it is given up. */
+static void loosen_plug(void)
+{
+    const int part = (int)chance((uint32_t)life.limb.count);
+    if (is_plugged(part) && !is_during(life.loose_until[part])) {
+        life.loose_until[part] = life.ms + (chance(2) == 0 ? 20 + chance(3000) : 10000 + chance(8000));
+        life.watch.cut[part] = true;
+        limb_cut(&life.limb, part, true);
+        life_watch_rough(&life.watch, part, life.loose_until[part]);
+    }
+}
+
+static void restart(void)
+{
+    stop_arbitrator(0);
+}
+
+static void forge(uint16_t id, uint8_t len, uint8_t code, uint8_t second, uint8_t third, uint8_t fourth,
+                  uint8_t fifth)
+{
+    const can_frame_t frame = {.id = id, .dlc = len, .data = {code, second, third, fourth, fifth}};
+    (void)sim_bus_send(&life.limb.world.bus, life.foreign_port, &frame);
+}
+
+/* The id to which somebody else's request goes, in the arbitrator's name. */
+static uint16_t request_id(int part)
+{
+    return pdcp_can_id(PDCP_PRIORITY_NORMAL, true,
+                       pdcp_device_node_id(sim_node_device(life.limb.parts[part].node)));
+}
+
+/* A part that is plugged in, and one of its channels; false: none was found. */
+static bool pick_channel(int *part, uint8_t *channel)
+{
+    *part = (int)chance((uint32_t)life.limb.count);
+    const uint8_t count = ini_of(*part)->desc.channel_count;
+    *channel = count != 0 ? (uint8_t)(1 + chance(count)) : 0;
+    return is_plugged(*part) && count != 0;
+}
+
+static void forge_flag(void)
+{
+    int part;
+    uint8_t channel;
+    if (pick_channel(&part, &channel)) {
+        forge(request_id(part), 4, PDCP_SET_PARAMETER, PDCP_CH_ENABLED, channel, 0, 0);
+    }
+}
+
+/* An input is to hear another output. */
+static void forge_source(void)
+{
+    int part;
+    int other;
+    uint8_t channel;
+    uint8_t output;
+    if (pick_channel(&part, &channel) && pick_channel(&other, &output) && part != other &&
+        ini_of(part)->desc.channels[channel - 1].direction == PDCP_INPUT) {
+        const pdcp_device_t *source = sim_node_device(life.limb.parts[other].node);
+        life.watch.forged_ms[part][channel] = life.ms + LIFE_AUDIT_MS;
+        forge(request_id(part), 5, PDCP_SET_PARAMETER, PDCP_IN_SOURCE_NODES, channel,
+              pdcp_device_node_id(source), pdcp_device_channel(source, output)->node_id);
+    }
+}
+
+static void forge_suspend(void)
+{
+    int part;
+    uint8_t channel;
+    if (pick_channel(&part, &channel)) {
+        forge(request_id(part), 3, PDCP_SUSPEND, 0, 0, 0, 0);
+    }
+}
+
+static void forge_reset(void)
+{
+    int part;
+    uint8_t channel;
+    if (pick_channel(&part, &channel)) {
+        forge(request_id(part), 1, PDCP_RESET, 0, 0, 0, 0);
+    }
+}
+
+static void beacon_of_unknown(void)
+{
+    const uint8_t id = (uint8_t)(1 + chance(254));
+    if (life.limb.world.app != NULL && life.limb.app.arb.bus.nodes.owner[id] == 0) {
+        forge(id, 1, PDCP_BEACON, 0, 0, 0, 0);
+    }
+}
+
+static void beacon_of_another(void)
+{
+    forge(0x100, 1, PDCP_BEACON, 0, 0, 0, 0);
+    life_watch_rough(&life.watch, -1, life.ms + STANDBY_MS);
 }
 
 static const struct {
     uint8_t weight;
     void (*happens)(void);
-} events[] = {{30, ask},       {12, plug_or_pull}, {6, mute},        {6, refuse},
-              {3, spoil_line}, {2, black_out},     {4, wear_memory}, {2, cut_power},
-              {4, babble},     {2, turn_deaf},     {2, close_host},  {1, meet_another}};
+    int number; /* of its switch; SWITCHES: it always happens */
+} events[] = {{30, ask, SWITCHES},
+              {12, plug_or_pull, SWITCHES},
+              {6, mute, SWITCHES},
+              {6, refuse, SWITCHES},
+              {3, spoil_line, SWITCHES},
+              {2, black_out, SWITCHES},
+              {4, wear_memory, SWITCHES},
+              {2, cut_power, SWITCHES},
+              {4, babble, SWITCHES},
+              {2, turn_deaf, SWITCHES},
+              {2, close_host, SWITCHES},
+              {1, meet_another, SWITCHES},
+              {8, plug_or_pull_clone, CLONES_COME},
+              {8, loosen_plug, LOOSE_PLUGS},
+              {8, lose_one, LOST_FRAMES},
+              {3, restart, RESTARTS},
+              {4, forge_flag, FORGED_FLAGS},
+              {6, forge_source, FORGED_SOURCES},
+              {3, forge_suspend, FORGED_SUSPENDS},
+              {3, forge_reset, FORGED_RESETS},
+              {2, beacon_of_unknown, UNKNOWN_BEACONS},
+              {1, beacon_of_another, FOREIGN_BEACONS}};
+
+static uint8_t weight_of(unsigned k)
+{
+    return events[k].number == SWITCHES || is_on(events[k].number) ? events[k].weight : 0;
+}
 
 static void happen(void)
 {
     unsigned sum = 0;
     for (unsigned k = 0; k < sizeof events / sizeof events[0]; k++) {
-        sum += events[k].weight;
+        sum += weight_of(k);
     }
     unsigned left = chance(sum);
     unsigned k = 0;
-    while (left >= events[k].weight) {
-        left -= events[k++].weight;
+    while (left >= weight_of(k)) {
+        left -= weight_of(k++);
     }
     events[k].happens();
 }
@@ -370,11 +628,21 @@ static void tell_state(void)
     }
 }
 
+static void mend_plugs(void)
+{
+    for (int i = 0; i < life.limb.count; i++) {
+        if (life.loose_until[i] != 0 && !is_during(life.loose_until[i])) {
+            mend_plug(i);
+        }
+    }
+}
+
 /* What began some time ago may end now. */
 static void carry_on(void)
 {
     const can_frame_t beacon = {.id = 0x100, .dlc = 1, .data = {PDCP_BEACON}};
     end_refusals();
+    mend_plugs();
     life.host.reads = !is_during(life.deaf_until);
     if (!is_during(life.gone_until)) {
         life_host_open(&life.host);
@@ -400,6 +668,7 @@ static void pass_ms(void)
     }
     limb_run_ms(&life.limb, 1);
     life.ms++;
+    life_watch_ms(&life.watch, life.ms);
     if (life.limb.world.app == NULL) {
         life_host_step(&life.host, &life.limb, life.ms);
         return;
@@ -427,16 +696,22 @@ static void begin_life(uint32_t seed)
     life.limb.world.bus.fault = line_loses;
     life.foreign_port = sim_bus_attach(&life.limb.world.bus, on_frame, NULL);
     const int parts = 2 + (int)chance(PARTS_MAX - 1);
+    life.parts = parts;
     for (int i = 0; i < parts; i++) {
         add_part(i);
     }
+    add_clones();
+    life_watch_init(&life.watch, &life.limb);
+    life.watch.values = is_on(VALUES);
+    life.watch.flags = is_on(FLAGS);
+    life.watch.twins = is_on(TWINS);
     start_arbitrator();
 }
 
 static void storm(void)
 {
     const uint32_t pause_ms = 20 + chance(400);
-    for (int i = 0; i < life.limb.count; i++) {
+    for (int i = 0; i < life.parts; i++) {
         if (chance(3) != 0) {
             limb_power_on(&life.limb, i);
         }
@@ -452,18 +727,37 @@ static void storm(void)
     }
 }
 
+/* A last word of those who forge: nothing else that happens mends what it does. */
+static void forge_at_last(void)
+{
+    for (unsigned k = 0; k < sizeof events / sizeof events[0]; k++) {
+        if (events[k].number >= FORGED_FLAGS && events[k].number < SWITCHES && is_on(events[k].number)) {
+            events[k].happens();
+        }
+    }
+}
+
 /* Nothing fails any more. */
 static void end_storm(void)
 {
+    forge_at_last();
     uint32_t *const lasts[] = {&life.off_until,  &life.black_until, &life.bad_until,  &life.foreign_until,
                                &life.deaf_until, &life.gone_until,  &life.busy_until, &life.worn_until};
     for (unsigned i = 0; i < sizeof lasts / sizeof lasts[0]; i++) {
         *lasts[i] = is_during(*lasts[i]) ? life.ms : *lasts[i];
     }
-    for (int i = 0; i < PARTS_MAX; i++) {
+    for (int i = 0; i < ALL_MAX; i++) {
         life.mute_until[i] = 0;
+        life.loose_until[i] = life.loose_until[i] != 0 ? life.ms : 0;
         life.refuse_until[i] = is_during(life.refuse_until[i]) ? life.ms : life.refuse_until[i];
     }
+    for (int i = life.parts; i < life.limb.count; i++) {
+        if (is_plugged(i)) {
+            mend_plug(i);
+            limb_power_off(&life.limb, i);
+        }
+    }
+    life_watch_calm_down(&life.watch, life.ms);
     life.limb.nvm.cut_after = SIM_NVM_NEVER;
 }
 
@@ -485,6 +779,7 @@ static void calm_down(void)
     TEST_ASSERT_EQUAL_MESSAGE(0, life.strange_frames, "frames on a calm bus");
     TEST_ASSERT_EQUAL_MESSAGE(0, life.limb.nvm.misuses, "misuses of the memory");
     life_check_calm(&life.limb);
+    life_watch_calm(&life.watch);
 }
 
 static void test_lives(void)
@@ -691,6 +986,11 @@ static void test_nothing_is_saved_on_standby(void)
 int main(int argc, char **argv)
 {
     const char *count = getenv("LIFE_COUNT");
+    if (argc > 1 && strncmp(argv[1], "--with=", 7) == 0) {
+        switch_on(argv[1] + 7);
+        argc--;
+        argv++;
+    }
     first_seed = argc > 1 ? (uint32_t)strtoul(argv[1], NULL, 0) : 1;
     seeds = argc > 2 ? (uint32_t)strtoul(argv[2], NULL, 0) : (argc > 1 ? 1 : LIVES);
     seeds = count != NULL ? (uint32_t)strtoul(count, NULL, 0) : seeds;

@@ -342,6 +342,73 @@ static void test_sim_bus_detach_in_interframe_space_leaves_an_idle_bus(void)
     TEST_ASSERT_EQUAL_UINT64(9055, sim_bus_step(&bus, 9000));
 }
 
+/* Its frames wait for the line, and it misses what is sent meanwhile. */
+static void test_sim_bus_cut_port_neither_hears_nor_sends(void)
+{
+    int a = attach();
+    int b = attach();
+    int c = attach();
+
+    sim_bus_send(&bus, a, &frame_001);
+    sim_bus_cut(&bus, a, true);
+    sim_bus_send(&bus, a, &frame_7ff);
+    TEST_ASSERT_EQUAL_UINT64(SIM_BUS_NEVER, sim_bus_step(&bus, 0));
+    sim_bus_send(&bus, b, &frame_100);
+    TEST_ASSERT_EQUAL_UINT64(55, sim_bus_step(&bus, 0));
+    TEST_ASSERT_EQUAL_UINT64(SIM_BUS_NEVER, sim_bus_step(&bus, 55));
+    sim_bus_step(&bus, 1000);
+    sim_bus_cut(&bus, a, false);
+    sim_bus_step(&bus, 1000);
+    sim_bus_step(&bus, 2000);
+    TEST_ASSERT_EQUAL_INT(5, heard.count);
+    assert_delivery(0, 55, c, 0x100);
+    assert_delivery(1, 1056, b, 0x001);
+    assert_delivery(3, 1106, b, 0x7FF);
+}
+
+/* Half a frame is none. */
+static void test_sim_bus_mended_port_does_not_hear_the_frame_on_the_wire(void)
+{
+    int a = attach();
+    int b = attach();
+
+    sim_bus_cut(&bus, b, true);
+    sim_bus_send(&bus, a, &frame_100);
+    sim_bus_step(&bus, 0);
+    sim_bus_cut(&bus, b, false);
+    sim_bus_step(&bus, 100);
+    TEST_ASSERT_EQUAL_INT(0, heard.count);
+    sim_bus_cut(&bus, a, true);
+    sim_bus_detach(&bus, a);
+    TEST_ASSERT_EQUAL_INT(a, attach());
+    sim_bus_send(&bus, a, &frame_100);
+    sim_bus_step(&bus, 200);
+    TEST_ASSERT_EQUAL_UINT64(SIM_BUS_NEVER, sim_bus_step(&bus, 300));
+    TEST_ASSERT_EQUAL_INT(1, heard.count);
+}
+
+static bool note_sender(void *ctx, const can_frame_t *frame)
+{
+    (void)frame;
+    *(int *)ctx = bus.delivering;
+    return false;
+}
+
+static void test_sim_bus_tells_whose_frame_it_delivers(void)
+{
+    int sender = -1;
+    (void)attach();
+    int b = attach();
+
+    bus.fault = note_sender;
+    bus.fault_ctx = &sender;
+    sim_bus_send(&bus, b, &frame_100);
+    sim_bus_step(&bus, 0);
+    sim_bus_step(&bus, 100);
+    TEST_ASSERT_EQUAL_INT(b, sender);
+    TEST_ASSERT_EQUAL_INT(-1, bus.delivering);
+}
+
 static void test_sim_bus_all_ports_taken(void)
 {
     for (int i = 0; i < SIM_BUS_PORTS_MAX; i++) {
@@ -501,6 +568,9 @@ int main(void)
     RUN_TEST(test_sim_bus_detach_forgets_the_queue_but_not_the_wire);
     RUN_TEST(test_sim_bus_new_port_does_not_hear_the_frame_on_the_wire);
     RUN_TEST(test_sim_bus_detach_in_interframe_space_leaves_an_idle_bus);
+    RUN_TEST(test_sim_bus_cut_port_neither_hears_nor_sends);
+    RUN_TEST(test_sim_bus_mended_port_does_not_hear_the_frame_on_the_wire);
+    RUN_TEST(test_sim_bus_tells_whose_frame_it_delivers);
     RUN_TEST(test_sim_bus_all_ports_taken);
     RUN_TEST(test_sim_bus_reply_from_the_callback_competes_from_the_end);
     RUN_TEST(test_sim_bus_reply_on_a_quiet_bus_starts_after_the_interframe_space);

@@ -368,14 +368,18 @@ static void take_over(pdcp_arb_t *arb)
     pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
 }
 
-/* Without devices of its own an arbitrator goes on standby when another one serves; with some it stays, but
- * when two hear each other for long, the one whose time comes first yields (D-BUS-42). */
+/* Without devices of its own an arbitrator goes on standby when another one serves. With some it stays; but
+ * when two with devices of their own hear each other for long, the one whose time comes first yields. That
+ * the other one has devices is seen when one answers it: beacons alone, which may be forged, take no limb its
+ * arbitrator (D-BUS-42). */
 static bool is_to_yield(const pdcp_arb_t *arb)
 {
     const uint32_t now_ms = arb->bus.now_ms;
     const uint32_t stays_ms = PDCP_YIELD_MS + arb->serial % PDCP_YIELD_SPREAD_MS;
-    return pdcp_standby_serves(&arb->standby, now_ms) &&
-           (!has_own(arb) || now_ms - arb->standby.since_ms >= stays_ms);
+    if (has_own(arb)) {
+        return pdcp_standby_is_answered(&arb->standby, now_ms) && now_ms - arb->standby.since_ms >= stays_ms;
+    }
+    return pdcp_standby_serves(&arb->standby, now_ms);
 }
 
 static void on_foreign_beacon(pdcp_arb_t *arb)
@@ -662,9 +666,7 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
-    if (arb->listening) {
-        on_foreign_answer(arb, frame);
-    }
+    on_foreign_answer(arb, frame);
     bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
     if (!replied) {
         const pdcp_decode_t decoded = pdcp_decode(frame, &msg);

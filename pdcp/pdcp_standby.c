@@ -68,16 +68,17 @@ bool pdcp_standby_on_answer(pdcp_standby_t *standby, uint32_t now_ms, const can_
     return true;
 }
 
+bool pdcp_standby_is_answered(const pdcp_standby_t *standby, uint32_t now_ms)
+{
+    return pdcp_standby_is_heard(standby, now_ms) && standby->answered &&
+           is_recent(now_ms, standby->answered_ms);
+}
+
 bool pdcp_standby_serves(const pdcp_standby_t *standby, uint32_t now_ms)
 {
-    if (!pdcp_standby_is_heard(standby, now_ms)) {
-        return false;
-    }
-    if (standby->answered && is_recent(now_ms, standby->answered_ms)) {
-        return true;
-    }
-    return standby->beacons == PDCP_STANDBY_BEACONS && !standby->doubted &&
-           is_recent(now_ms, standby->beacon_ms[PDCP_STANDBY_BEACONS - 1]);
+    return pdcp_standby_is_answered(standby, now_ms) ||
+           (standby->beacons == PDCP_STANDBY_BEACONS && !standby->doubted &&
+            is_recent(now_ms, standby->beacon_ms[PDCP_STANDBY_BEACONS - 1]));
 }
 
 void pdcp_standby_on_sign_of_life(pdcp_standby_t *standby)

@@ -42,6 +42,9 @@ void pdcp_standby_on_time(pdcp_standby_t *standby, uint32_t now_ms);
 /* Has another arbitrator been heard lately? */
 bool pdcp_standby_is_heard(const pdcp_standby_t *standby, uint32_t now_ms);
 
+/* Has a device answered another arbitrator that is heard lately? */
+bool pdcp_standby_is_answered(const pdcp_standby_t *standby, uint32_t now_ms);
+
 /* Does another arbitrator serve? */
 bool pdcp_standby_serves(const pdcp_standby_t *standby, uint32_t now_ms);
 

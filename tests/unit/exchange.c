@@ -287,6 +287,8 @@ void exchange_meet_rival(exchange_t *x)
     const uint32_t until_ms = x->now_ms + PDCP_YIELD_MS + EXCHANGE_SERIAL;
     while (pdcp_time_before(x->now_ms, until_ms)) {
         exchange_rx(x, "100#0A");
+        exchange_rx(x, "345#03 0A 00"); /* a device of its own answers it */
+        exchange_rx(x, "245#83 01 0A 00 F401");
         exchange_beacons(x);
         exchange_pass(x, 500);
     }

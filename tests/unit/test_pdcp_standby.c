@@ -36,8 +36,26 @@ static void test_an_arbitrator_without_devices_goes_on_standby(void)
     TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_get(x.arb, 0, 0, 1, NULL, 0));
 }
 
+/* D-BUS-49: of requests that are held together two are granted at once, the others one by one. */
+static void test_held_requests_are_granted_a_few_at_a_time(void)
+{
+    for (uint16_t i = 1; i <= 5; i++) {
+        can_frame_t frame = exchange_frame("600#01 0900 0900 0000");
+        frame.id = (uint16_t)(frame.id + i);
+        frame.data[5] = (uint8_t)i;
+        (void)pdcp_arb_on_frame(x.arb, x.now_ms, &frame);
+    }
+    static const uint8_t granted[] = {0, 2, 2, 3, 3, 4, 4, 5};
+    exchange_wait(&x, PDCP_HOLD_MS - 1);
+    for (unsigned i = 0; i < sizeof granted; i++) {
+        TEST_ASSERT_EQUAL(granted[i], stat_of(PDCP_STAT_BIND_GRANTED));
+        exchange_wait(&x, i % 2 == 0 ? 1 : PDCP_HOLD_PACE_MS - 1);
+        (void)exchange_drain(&x);
+    }
+}
+
 /* D-BUS-42: one whose beacons have not left for 1600 ms, because it was hung or off the bus, sends nothing
- * for 600 ms. It goes on if nobody else serves by then. */
+ * for 600 ms. It goes on if nobody else serves by then (D-BUS-51). */
 static void test_a_hung_arbitrator_listens_first(void)
 {
     exchange_add_output(&x, "FE");
@@ -350,6 +368,7 @@ int main(void)
 {
     UNITY_BEGIN();
     RUN_TEST(test_an_arbitrator_without_devices_goes_on_standby);
+    RUN_TEST(test_held_requests_are_granted_a_few_at_a_time);
     RUN_TEST(test_a_hung_arbitrator_listens_first);
     RUN_TEST(test_a_hung_arbitrator_gives_way_to_one_that_serves);
     RUN_TEST(test_a_question_for_an_identity_is_no_service);

@@ -431,6 +431,20 @@ static void test_the_reader_is_small(void)
     TEST_ASSERT_LESS_THAN(sizeof(void *) == 2 ? 120 : 160, sizeof(profile_tlv_t));
 }
 
+/* D-BUS-53: whom the links name is known, and most others are not taken for one of them. */
+static void test_the_devices_that_links_name(void)
+{
+    static const pdcp_identity_t named = {30, 40, 50};
+    int others = 0;
+    (void)read_all(figure, sizeof figure);
+    TEST_ASSERT_TRUE(profile_tlv_names(reader.names, &named));
+    for (uint16_t sn = 1; sn <= 1000; sn++) {
+        const pdcp_identity_t other = {31, 40, sn};
+        others += profile_tlv_names(reader.names, &other) ? 1 : 0;
+    }
+    TEST_ASSERT_LESS_THAN(40, others); /* the figure names two, one of them 0:0:0 */
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -452,5 +466,6 @@ int main(void)
     RUN_TEST(test_every_value_is_written_to_its_place);
     RUN_TEST(test_no_string_harms_and_what_is_accepted_can_be_written);
     RUN_TEST(test_the_reader_is_small);
+    RUN_TEST(test_the_devices_that_links_name);
     return UNITY_END();
 }

@@ -9,9 +9,9 @@
 /* Nothing is known of the bus; what is remembered and counted stays. Its devices may still speak. */
 static void forget_bus(pdcp_arb_t *arb)
 {
-    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+    for (unsigned id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
         if (arb->bus.nodes.owner[id] != 0) {
-            pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+            pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, (uint8_t)id);
         }
     }
     arb->bus.bind.shut = pdcp_unknown_any(&arb->bus.unknown);

@@ -141,7 +141,9 @@ static uint8_t next_id(uint8_t id, int8_t step)
 static uint8_t unheard_id(const pdcp_bus_t *bus)
 {
     uint8_t best = 0;
-    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+    uint8_t id = PDCP_NODE_MAX;
+    for (uint8_t left = PDCP_NODE_MAX; left > 0; left--) {
+        id = next_id(id, 1);
         if (is_free(bus, id) && (best == 0 || pdcp_unknown_silence(&bus->unknown, id) >
                                                   pdcp_unknown_silence(&bus->unknown, best))) {
             best = id;

@@ -567,17 +567,16 @@ static void run(pdcp_bus_t *bus)
 {
     while (bus->link.active && bus->link.at == PDCP_NONE) {
         pdcp_channel_t *channel = channel_of(bus, target_of(bus));
+        const bool is_idle = bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output);
         if (!step_possible(bus)) {
             if (bus->link.undoing) {
                 advance(bus);
             } else {
                 give_up(bus, PDCP_ERR_NO_ANSWER);
             }
-        } else if (bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output)) {
-            advance(bus);
-        } else if (!pdcp_request_is_idle(bus, channel->node) || is_too_early(bus)) {
+        } else if (!is_idle && (!pdcp_request_is_idle(bus, channel->node) || is_too_early(bus))) {
             return;
-        } else if (send_step(bus, channel)) {
+        } else if (!is_idle && send_step(bus, channel)) {
             bus->link.at = channel->node;
         } else {
             advance(bus);

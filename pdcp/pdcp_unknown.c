@@ -58,7 +58,7 @@ static void set_tick(pdcp_unknown_t *unknown, uint8_t id, uint8_t tick, bool tol
 static void sweep(pdcp_unknown_t *unknown)
 {
     unknown->swept = unknown->tick;
-    for (uint16_t id = 0; id < sizeof unknown->heard; id++) {
+    for (unsigned id = 0; id < PDCP_UNKNOWN_IDS; id++) {
         const uint8_t tick = unknown->heard[id];
         if (tick != 0 && ticks_since(unknown, tick) >= PDCP_UNKNOWN_QUIET) {
             set_tick(unknown, (uint8_t)id, 0, false);
@@ -129,7 +129,7 @@ uint8_t pdcp_unknown_silence(const pdcp_unknown_t *unknown, uint8_t id)
 
 bool pdcp_unknown_any(const pdcp_unknown_t *unknown)
 {
-    for (uint16_t id = 0; id < sizeof unknown->heard; id++) {
+    for (unsigned id = 0; id < PDCP_UNKNOWN_IDS; id++) {
         if (pdcp_unknown_silence(unknown, (uint8_t)id) < PDCP_UNKNOWN_QUIET) {
             return true;
         }

@@ -10,18 +10,21 @@
 #include <stdint.h>
 
 enum {
+    PDCP_UNKNOWN_IDS = 256,
     PDCP_UNKNOWN_TICK_MS = 100,
     PDCP_UNKNOWN_QUIET = 120,     /* ticks, 12 s: an id that was silent for so long is quiet */
     PDCP_UNKNOWN_RESET_PAUSE = 10 /* ticks, 1 s: between two Resets to the same id (D-BUS-15) */
 };
 
 typedef struct {
-    uint32_t tick_ms;          /* when the tick under way began */
-    uint8_t tick;              /* its number, 1 to 255, then 1 again */
-    uint8_t swept;             /* tick of the last sweep */
-    uint8_t heard[256];        /* by node id: tick of the last frame, or of the last Reset; 0: quiet */
-    uint8_t answered[256 / 8]; /* by node id: whoever was told has answered, and was not heard since */
-    uint8_t told[256 / 8];     /* by node id: heard[] is the tick of a Reset, less than a second ago */
+    uint32_t tick_ms;                /* when the tick under way began */
+    uint8_t tick;                    /* its number, 1 to 255, then 1 again */
+    uint8_t swept;                   /* tick of the last sweep */
+    uint8_t heard[PDCP_UNKNOWN_IDS]; /* by node id: tick of the last frame, or of the last Reset; 0: quiet */
+    uint8_t answered[PDCP_UNKNOWN_IDS /
+                     8]; /* by node id: whoever was told has answered, and was not heard since */
+    uint8_t
+        told[PDCP_UNKNOWN_IDS / 8]; /* by node id: heard[] is the tick of a Reset, less than a second ago */
 } pdcp_unknown_t;
 
 /* All ids are quiet. */

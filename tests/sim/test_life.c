@@ -566,31 +566,31 @@ static void beacon_of_another(void)
 }
 
 static const struct {
-    uint8_t weight;
     void (*happens)(void);
     int number; /* of its switch; SWITCHES: it always happens */
-} events[] = {{30, ask, SWITCHES},
-              {12, plug_or_pull, SWITCHES},
-              {6, mute, SWITCHES},
-              {6, refuse, SWITCHES},
-              {3, spoil_line, SWITCHES},
-              {2, black_out, SWITCHES},
-              {4, wear_memory, SWITCHES},
-              {2, cut_power, SWITCHES},
-              {4, babble, SWITCHES},
-              {2, turn_deaf, SWITCHES},
-              {2, close_host, SWITCHES},
-              {1, meet_another, SWITCHES},
-              {8, plug_or_pull_clone, CLONES_COME},
-              {8, loosen_plug, LOOSE_PLUGS},
-              {8, lose_one, LOST_FRAMES},
-              {3, restart, RESTARTS},
-              {4, forge_flag, FORGED_FLAGS},
-              {6, forge_source, FORGED_SOURCES},
-              {3, forge_suspend, FORGED_SUSPENDS},
-              {3, forge_reset, FORGED_RESETS},
-              {2, beacon_of_unknown, UNKNOWN_BEACONS},
-              {1, beacon_of_another, FOREIGN_BEACONS}};
+    uint8_t weight;
+} events[] = {{ask, SWITCHES, 30},
+              {plug_or_pull, SWITCHES, 12},
+              {mute, SWITCHES, 6},
+              {refuse, SWITCHES, 6},
+              {spoil_line, SWITCHES, 3},
+              {black_out, SWITCHES, 2},
+              {wear_memory, SWITCHES, 4},
+              {cut_power, SWITCHES, 2},
+              {babble, SWITCHES, 4},
+              {turn_deaf, SWITCHES, 2},
+              {close_host, SWITCHES, 2},
+              {meet_another, SWITCHES, 1},
+              {plug_or_pull_clone, CLONES_COME, 8},
+              {loosen_plug, LOOSE_PLUGS, 8},
+              {lose_one, LOST_FRAMES, 8},
+              {restart, RESTARTS, 3},
+              {forge_flag, FORGED_FLAGS, 4},
+              {forge_source, FORGED_SOURCES, 6},
+              {forge_suspend, FORGED_SUSPENDS, 3},
+              {forge_reset, FORGED_RESETS, 3},
+              {beacon_of_unknown, UNKNOWN_BEACONS, 2},
+              {beacon_of_another, FOREIGN_BEACONS, 1}};
 
 static uint8_t weight_of(unsigned k)
 {

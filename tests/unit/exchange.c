@@ -263,7 +263,7 @@ void exchange_check_fails(exchange_t *x, const char *node_id)
 {
     char question[16];
     (void)snprintf(question, sizeof question, "3%s#03 01 00", node_id);
-    for (uint8_t tries = 0; tries < PDCP_CHECK_TRIES; tries++) {
+    for (int tries = 0; tries < PDCP_CHECK_TRIES; tries++) {
         exchange_tx(x, question);
         exchange_pass(x, PDCP_ACK_MS);
     }

@@ -9,7 +9,9 @@
  * stamps, and only a reset brings it back from bus-off. Prints "ready" when the device may be plugged in.
  * Commands come as datagrams at CONTROL_SOCKET, each is answered with the counters as a JSON object:
  *
- *     report | bus-off | errors TX RX | overflow
+ *     report | bus-off | bus-off-after ECHOES | errors TX RX | overflow
+ *
+ * bus-off-after: when so many frames of the host have gone out since the start, whenever that is.
  */
 #include <errno.h>
 #include <fcntl.h>
@@ -95,6 +97,7 @@ typedef struct {
     uint32_t flags;
     unsigned state, tx_errors, rx_errors;
     uint64_t restart_at_ms;               /* 0: not by itself */
+    unsigned bus_off_at;                  /* echoes; 0: never */
     transfer_t transfers[READS + WRITES]; /* reads first */
     queue_t from_host, to_host;
     unsigned under_way; /* frames of the host whose echo it has not got yet */
@@ -308,6 +311,9 @@ static void send_more(adapter_t *adapter)
         frame_t echo = pop(&adapter->from_host);
         tell_host(adapter, &echo);
         adapter->counters.echoes++;
+        if (adapter->counters.echoes == adapter->bus_off_at) {
+            go_bus_off(adapter);
+        }
     }
 }
 
@@ -550,6 +556,8 @@ static void on_command(adapter_t *adapter)
         go_bus_off(adapter);
     } else if (strcmp(text, "overflow") == 0) {
         adapter->overflow = true;
+    } else if (sscanf(text, "bus-off-after %u", &adapter->bus_off_at) == 1) {
+        /* when it comes to that */
     } else if (sscanf(text, "errors %u %u", &tx, &rx) == 2) {
         set_errors(adapter, tx, rx);
     }

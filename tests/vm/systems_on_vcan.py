@@ -12,7 +12,19 @@ from pathlib import Path
 from programs import Pdcpd, Program, until
 
 from pdcp import Action, ChannelId, Identity, LinkStatus
-from tests.vm.bench import D1, D2, D3, DEADLINE_S, LINKS, ROOT, Bench, main
+from tests.vm.bench import (
+    D1,
+    D2,
+    D3,
+    DEADLINE_S,
+    DEVICES,
+    LINKS,
+    PARAMETER_NODE_ID,
+    PARAMETER_OUTPUT_ID,
+    ROOT,
+    Bench,
+    main,
+)
 
 Links = set[tuple[ChannelId, ChannelId]]
 
@@ -81,10 +93,14 @@ class System:
 
         until(arrived, "values arrive at both inputs of D3", DEADLINE_S)
 
-    def assert_received(self, name: str) -> None:
-        """A part without terminal inputs has received values."""
+    def assert_received(self, name: str, output: ChannelId) -> None:
+        """A part without terminal inputs has received values of an output."""
+        candump = self.bench.candump()
+        (output_id,) = self.host.get_parameter(output, PARAMETER_OUTPUT_ID)
+        candump.await_frame(f"0{output_id:02X}#.*")
+        # It takes its frames in order: when it answers, it has that one.
+        self.host.get_parameter(ChannelId(DEVICES[name]), PARAMETER_NODE_ID)
         part = self.parts.pop(name)
-        time.sleep(1.0)
         assert part.stop() == 0, part.errors
         count = json.loads(part.errors[-1])["data_in"]
         self.bench.say(f"{count} values have arrived at {name}")
@@ -111,7 +127,8 @@ def replaced_part(bench: Bench, number: int, before: Links, after: Links) -> Non
     system.plug(stays, new)
     system.await_links(after, "power-on")
     assert system.host.info().active == 1
-    system.assert_received("d3")
+    ((output, _),) = after
+    system.assert_received("d3", output)
 
 
 def system_1(bench: Bench) -> None:

@@ -712,6 +712,18 @@ bool pdcp_link_is_settled(const pdcp_bus_t *bus)
     return (!bus->link.active || bus->link.kind == PDCP_TODO_AGAIN) && !has_work(bus);
 }
 
+bool pdcp_link_is_making(const pdcp_bus_t *bus)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *channel = &bus->nodes.channels[i];
+        if ((channel->todo & PDCP_TODO_CONNECT) != 0 &&
+            bus->nodes.nodes[channel->node].state == PDCP_NODE_READY) {
+            return true;
+        }
+    }
+    return bus->link.active && bus->link.kind == PDCP_TODO_CONNECT;
+}
+
 /* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. But who
  * waits for its place is served when a request of it ends, so that none may be broken off. */
 static void break_off(pdcp_bus_t *bus)

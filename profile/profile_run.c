@@ -211,17 +211,34 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
     run->urgent = urgent;
 }
 
-/* The oldest of too many is tried again. */
-static void ban(profile_run_t *run, uint32_t now_ms)
+/* Leaves a pair out until this time. The oldest of too many is tried again. */
+static void ban(profile_run_t *run, profile_pair_t pair, uint32_t until_ms)
 {
     memmove(&run->scene.banned[1], &run->scene.banned[0],
             sizeof run->scene.banned - sizeof run->scene.banned[0]);
-    run->scene.banned[0] = run->wish;
+    run->scene.banned[0] = pair;
     if (run->scene.banned_count < PROFILE_BANNED_MAX) {
         run->scene.banned_count++;
     }
     run->tries = 0;
-    run->retry_ms = now_ms + PROFILE_RETRY_MS;
+    run->retry_ms = until_ms;
+}
+
+/* A link that worked does not any more, and nobody in this layer wanted that. If an end is missing, which may
+ * have been lost before it beaconed, or the device names no source any more, another one is looked for at
+ * once. Otherwise a device does not answer or refuses: first of all, what requires the input rests (D-PRO-9);
+ * after a pause all is planned again, as a remembered link is without this layer (D-BUS-26). */
+static void on_broken(profile_run_t *run, uint32_t now_ms, uint8_t input)
+{
+    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
+    run->plan.want[input] = PDCP_NONE;
+    if (profile_is_ready(run->scene.nodes, pair.output, PDCP_OUTPUT) &&
+        profile_is_ready(run->scene.nodes, input, PDCP_INPUT)) {
+        ban(run, pair, now_ms + PDCP_LINK_PAUSE_MS);
+        make_due(run, PROFILE_PLAN_SETTLE);
+    } else {
+        make_due(run, run->at_events);
+    }
 }
 
 /* A link that this layer has asked for is made, or is not. On a bad line, or when a device was away for a
@@ -235,13 +252,15 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
         run->moves++;
         return;
     }
+    if (run->what == PROFILE_PLAN_ENFORCE) { /* it was lost meanwhile; the action ends without it */
+        on_broken(run, now_ms, run->wish.input);
+        return;
+    }
     run->tries++;
     if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
-        ban(run, now_ms);
+        ban(run, run->wish, now_ms + PROFILE_RETRY_MS);
     }
-    if (run->what != PROFILE_PLAN_ENFORCE) {
-        make_due(run, run->what);
-    }
+    make_due(run, run->what);
 }
 
 /* Is the working link of an input another one than the plan knows or wants? */
@@ -278,17 +297,34 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
     make_due(run, PROFILE_PLAN_SETTLE);
 }
 
-/* The link of an input has changed, by whomever. */
-static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
+/* Has the link of an input, which was made by a plan that is done, stopped working for good? A job may still
+ * be about to make it again. */
+static bool is_broken(const profile_run_t *run, uint8_t input)
 {
+    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    return run->state == PROFILE_RUNNING && run->plan.want[input] != PDCP_NONE &&
+           channel->link != PDCP_LINK_ACTIVE && (channel->todo & PDCP_TODO_CONNECT) == 0;
+}
+
+/* The link of an input has changed, by whomever. That of a link which this layer has asked for comes with
+ * PDCP_EVENT_WISH. */
+static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+{
+    const uint8_t link = run->scene.nodes->channels[input].link;
     const uint8_t entry = entry_of(run, input);
     const bool dropping = profile_bit(run->dropping, input);
-    if (run->scene.nodes->channels[input].link == PDCP_LINK_NONE) {
+    if (link == PDCP_LINK_NONE) {
         profile_set_bit(run->dropping, input, false);
-        if (arb->bus.link.kind == PDCP_TODO_REMOVE && !dropping) {
-            on_removed(run, input, entry);
-        }
-    } else if (run->state != PROFILE_WAITING && !arb->bus.link.stored && !run->wishing && !dropping) {
+    }
+    if (dropping) {
+        return;
+    }
+    if (link == PDCP_LINK_NONE && arb->bus.link.kind == PDCP_TODO_REMOVE) {
+        on_removed(run, input, entry);
+    } else if (is_broken(run, input)) {
+        on_broken(run, now_ms, input);
+    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_WAITING && !arb->bus.link.stored &&
+               (!run->wishing || (link == PDCP_LINK_ACTIVE && input != run->wish.input))) {
         on_asked(run, input, entry);
     }
 }
@@ -320,7 +356,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         break;
     case PDCP_EVENT_LINK:
         if (event->channel != PDCP_NONE) {
-            on_link(run, arb, event->channel);
+            on_link(run, arb, now_ms, event->channel);
         }
         break;
     case PDCP_EVENT_SILENT:
@@ -551,12 +587,18 @@ static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
     return next_ms;
 }
 
-/* What the host has asked for is finished first. A plan for a new device waits for others that come with it.
- */
+/* A plan for a new device waits for others that come with it. */
+static bool awaits_arrivals(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
+{
+    return !run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms);
+}
+
+/* What the host has asked for is finished first: an action, or a link. A plan made while a link is half made
+ * would take it away again when it is whole; it could not be carried out earlier anyway. */
 static bool is_held_back(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    return run->what == PROFILE_PLAN_ENFORCE ||
-           (!run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms));
+    return run->what == PROFILE_PLAN_ENFORCE || pdcp_arb_link_running(arb) ||
+           awaits_arrivals(run, arb, now_ms);
 }
 
 bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
@@ -595,8 +637,8 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
         return now_ms;
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);
-    if (run->due != 0 && run->state != PROFILE_CONFIGURING && is_held_back(run, arb, now_ms)) {
-        return pdcp_time_earlier(next_ms, run->arrival_ms);
+    if (run->due == 0 || run->state == PROFILE_CONFIGURING || pdcp_arb_link_running(arb)) {
+        return next_ms;
     }
-    return next_ms;
+    return awaits_arrivals(run, arb, now_ms) ? pdcp_time_earlier(next_ms, run->arrival_ms) : now_ms;
 }

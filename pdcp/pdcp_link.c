@@ -637,6 +637,7 @@ static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
         channel->feed = output;
         if (output == PDCP_NONE || !is_ready(bus, number)) {
             silence_again(bus, number);
+            pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, number, PDCP_ERR_NO_ANSWER);
             return;
         }
     } else if (channel->transfer != PDCP_INPUT) {

@@ -574,6 +574,21 @@ static void test_update_data_channel_does_not_end_the_silencing(void)
     TEST_ASSERT_FALSE(the_input()->enabled);
 }
 
+/* A link that was to be made again, and whose source has gone before its turn: that is told, and the input is
+ * silenced. */
+static void test_a_link_whose_source_has_gone_is_not_made(void)
+{
+    pdcp_channel_t *channel = &x.arb->bus.nodes.channels[input()];
+    channel->link = PDCP_LINK_INACTIVE;
+    channel->enabled = true;
+    channel->todo = PDCP_TODO_CONNECT;
+    x.arb->bus.link.due = true;
+    exchange_step(&x);
+    exchange_tx(&x, "312#04 04 01 00");
+    TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_LINK)->channel);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK)->status);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -603,5 +618,6 @@ int main(void)
     RUN_TEST(test_a_link_waits_for_the_hosts_request);
     RUN_TEST(test_update_data_channel_does_not_keep_an_input_from_being_silenced);
     RUN_TEST(test_update_data_channel_does_not_end_the_silencing);
+    RUN_TEST(test_a_link_whose_source_has_gone_is_not_made);
     return UNITY_END();
 }

@@ -211,34 +211,31 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
     run->urgent = urgent;
 }
 
-/* Leaves a pair out until this time. The oldest of too many is tried again. */
-static void ban(profile_run_t *run, profile_pair_t pair, uint32_t until_ms)
+/* The oldest of too many is tried again. */
+static void ban(profile_run_t *run, uint32_t now_ms)
 {
     memmove(&run->scene.banned[1], &run->scene.banned[0],
             sizeof run->scene.banned - sizeof run->scene.banned[0]);
-    run->scene.banned[0] = pair;
+    run->scene.banned[0] = run->wish;
     if (run->scene.banned_count < PROFILE_BANNED_MAX) {
         run->scene.banned_count++;
     }
     run->tries = 0;
-    run->retry_ms = until_ms;
+    run->retry_ms = now_ms + PROFILE_RETRY_MS;
 }
 
-/* A link that worked does not any more, and nobody in this layer wanted that. If an end is missing, which may
- * have been lost before it beaconed, or the device names no source any more, another one is looked for at
- * once. Otherwise a device does not answer or refuses: first of all, what requires the input rests (D-PRO-9);
- * after a pause all is planned again, as a remembered link is without this layer (D-BUS-26). */
-static void on_broken(profile_run_t *run, uint32_t now_ms, uint8_t input)
+/* A link that worked does not any more, and nobody in this layer wanted that: an end is missing, which may
+ * have been lost before it beaconed, its device names another source, or does not answer. To make it again
+ * counts as its second try in the last case. */
+static void on_broken(profile_run_t *run, uint8_t input)
 {
-    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
+    const pdcp_nodes_t *nodes = run->scene.nodes;
     run->plan.want[input] = PDCP_NONE;
-    if (profile_is_ready(run->scene.nodes, pair.output, PDCP_OUTPUT) &&
-        profile_is_ready(run->scene.nodes, input, PDCP_INPUT)) {
-        ban(run, pair, now_ms + PDCP_LINK_PAUSE_MS);
-        make_due(run, PROFILE_PLAN_SETTLE);
-    } else {
-        make_due(run, run->at_events);
+    if (profile_is_ready(nodes, input, PDCP_INPUT) &&
+        profile_is_ready(nodes, nodes->channels[input].feed, PDCP_OUTPUT)) {
+        run->tries = 1;
     }
+    make_due(run, run->at_events);
 }
 
 /* A link that this layer has asked for is made, or is not. On a bad line, or when a device was away for a
@@ -253,12 +250,12 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
         return;
     }
     if (run->what == PROFILE_PLAN_ENFORCE) { /* it was lost meanwhile; the action ends without it */
-        on_broken(run, now_ms, run->wish.input);
+        on_broken(run, run->wish.input);
         return;
     }
     run->tries++;
     if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
-        ban(run, run->wish, now_ms + PROFILE_RETRY_MS);
+        ban(run, now_ms);
     }
     make_due(run, run->what);
 }
@@ -297,8 +294,8 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
     make_due(run, PROFILE_PLAN_SETTLE);
 }
 
-/* Has the link of an input, which was made by a plan that is done, stopped working for good? A job may still
- * be about to make it again. */
+/* Did the last plan, which is done, want a link that does not work any more? While it is about to be made
+ * again, it is not broken. */
 static bool is_broken(const profile_run_t *run, uint8_t input)
 {
     const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
@@ -308,7 +305,7 @@ static bool is_broken(const profile_run_t *run, uint8_t input)
 
 /* The link of an input has changed, by whomever. That of a link which this layer has asked for comes with
  * PDCP_EVENT_WISH. */
-static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
     const uint8_t link = run->scene.nodes->channels[input].link;
     const uint8_t entry = entry_of(run, input);
@@ -322,9 +319,9 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, 
     if (link == PDCP_LINK_NONE && arb->bus.link.kind == PDCP_TODO_REMOVE) {
         on_removed(run, input, entry);
     } else if (is_broken(run, input)) {
-        on_broken(run, now_ms, input);
+        on_broken(run, input);
     } else if (link != PDCP_LINK_NONE && run->state != PROFILE_WAITING && !arb->bus.link.stored &&
-               (!run->wishing || (link == PDCP_LINK_ACTIVE && input != run->wish.input))) {
+               !run->wishing) {
         on_asked(run, input, entry);
     }
 }
@@ -356,7 +353,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         break;
     case PDCP_EVENT_LINK:
         if (event->channel != PDCP_NONE) {
-            on_link(run, arb, now_ms, event->channel);
+            on_link(run, arb, event->channel);
         }
         break;
     case PDCP_EVENT_SILENT:
@@ -509,6 +506,61 @@ static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
 }
 
+/* Does a channel require an input of its device that is not connected? */
+static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
+{
+    const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
+    uint8_t c = owner->needs_stride != 0 ? owner->first_channel : (uint8_t)PDCP_NONE;
+    while (c != PDCP_NONE && (profile_feed(nodes, c) != PDCP_NONE ||
+                              !pdcp_nodes_needs(nodes, channel, false, nodes->channels[c].index))) {
+        c = nodes->channels[c].next;
+    }
+    return c != PDCP_NONE;
+}
+
+/* Is this a link of the host's, which needs nothing (D-PRO-9)? */
+static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
+{
+    const uint8_t entry = entry_of(run, input);
+    if (entry == PDCP_NONE) {
+        return false;
+    }
+    const profile_entry_t *own = &run->links.entries[entry];
+    return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, feed);
+}
+
+/* Does a link work that should not, because something that it requires is not connected? Links that the plan
+ * under way has made are left alone: those of a loop would never be made. */
+static bool is_lacking(const profile_run_t *run, uint8_t input)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const uint8_t feed = profile_feed(nodes, input);
+    return feed != PDCP_NONE && !profile_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
+           (misses_something(nodes, feed) || misses_something(nodes, input));
+}
+
+/* A plan may mean to connect what a working link requires, and most often that is done at once. When it does
+ * not go well, the link rests meanwhile (D-PRO-9): a device that does not answer may take long, and a hand
+ * would obey a controller that hears nothing. True: a link rests now. */
+static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
+{
+    bool rested = false;
+    uint8_t i = 0;
+    if (run->tries + run->scene.banned_count == 0 || run->what == PROFILE_PLAN_ENFORCE) {
+        return false;
+    }
+    while (i < PDCP_CHANNELS_MAX) {
+        if (is_lacking(run, i)) {
+            pdcp_arb_rest(arb, now_ms, i);
+            rested = true;
+            i = 0; /* others may require this one */
+        } else {
+            i++;
+        }
+    }
+    return rested;
+}
+
 /* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have
  * gone since the plan was made are the next plan's business. */
 static uint8_t next_input(const profile_run_t *run)
@@ -549,6 +601,9 @@ static bool carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
     unlink_all(run, arb, now_ms);
     if (!pdcp_arb_links_settled(arb)) {
+        return true;
+    }
+    if (rest_lacking(run, arb, now_ms)) {
         return true;
     }
     const uint8_t input = next_input(run);

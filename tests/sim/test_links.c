@@ -216,6 +216,24 @@ static void test_what_requires_a_source_that_never_beaconed(void)
     limb_expect(&limb, "");
 }
 
+/* The source of a required input is lost, and its device does not take another one. While all that could
+ * replace it is tried, what requires the input rests. */
+static void test_what_requires_an_input_rests_while_replacements_fail(void)
+{
+    begin_limb();
+    mute = 1;
+    limb_power_off(&limb, 2);
+    limb_want(&limb, "");
+    while (limb.lost.time_us == 0) {
+        limb_run_ms(&limb, 1);
+    }
+    limb_run_ms(&limb, 800); /* the input is silenced, and 4.1 tried once */
+    expect_listed("");
+    mute = NOBODY;
+    calm_down();
+    limb_expect(&limb, "2.2>1.1 4.1>2.1");
+}
+
 /* An action of the host, which comes first, does not insist on a link that was lost while it waited, and
  * whose device does not answer. */
 static void test_a_link_that_cannot_be_made_holds_up_no_action(void)
@@ -264,6 +282,7 @@ int main(void)
     RUN_TEST(test_a_loop_with_a_link_that_cannot_be_restored_rests);
     RUN_TEST(test_what_requires_an_input_that_gives_up_its_source);
     RUN_TEST(test_what_requires_a_source_that_never_beaconed);
+    RUN_TEST(test_what_requires_an_input_rests_while_replacements_fail);
     RUN_TEST(test_a_link_that_cannot_be_made_holds_up_no_action);
     RUN_TEST(test_a_stand_in_that_stays_keeps_its_sole_access);
     RUN_TEST(test_an_input_that_is_asked_for_is_silenced);

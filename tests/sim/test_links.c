@@ -83,11 +83,11 @@ static void name_source(int part, uint8_t vid, uint8_t pid)
     send(&frame);
 }
 
-/* Life 21601: an original that cannot come back, since what stands in for it is required. The host's link for
- * it is refused, for both want the output for themselves (D-API-13). */
-static void test_a_stand_in_that_stays_keeps_its_sole_access(void)
+/* The input 2.1 has lost its link to part 1, whose input stands in for it and is required by now. It is back.
+ */
+static void make_stand_in(const char *stand_in)
 {
-    (void)limb_add(&limb, 1, "in 5200 2110; out 5000 2130, required = 1");
+    (void)limb_add(&limb, 1, stand_in);
     (void)limb_add(&limb, 2, "in 5200 2110");
     (void)limb_add(&limb, 3, "out 5000 2120");
     (void)limb_add(&limb, 4, "in 5000 2120; out 5000 2110, required = 1");
@@ -104,11 +104,29 @@ static void test_a_stand_in_that_stays_keeps_its_sole_access(void)
     limb_power_on(&limb, 1);
     limb_run_ms(&limb, 1000);
     limb_expect(&limb, "4.2>1.1 1.2>4.1 4.2>5.1");
+}
+
+/* Life 21601: an original that cannot come back, since what stands in for it is required. The host's link for
+ * it is refused, for both want the output for themselves (D-API-13). */
+static void test_a_stand_in_that_stays_keeps_its_sole_access(void)
+{
+    make_stand_in("in 5200 2110; out 5000 2130, required = 1");
     const uint16_t answer = limb_link(&limb, 4, 2, 2, 1);
     const uint8_t error = limb.answer[8];
     calm_down();
     TEST_ASSERT_EQUAL_HEX16(0x2309, answer);
     TEST_ASSERT_EQUAL_HEX8(0x08, error);
+}
+
+/* D-PRO-6: the same without sole access. The host gets its link, and what stood in goes when nothing requires
+ * it any more. */
+static void test_a_stand_in_goes_after_the_host_has_made_the_original(void)
+{
+    make_stand_in("in 5000 2110; out 5000 2130, required = 1");
+    TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(&limb, 4, 2, 2, 1));
+    limb_power_on(&limb, 2);
+    calm_down();
+    limb_expect(&limb, "4.2>2.1 3.1>4.1 4.2>5.1");
 }
 
 /* Life 39003: a source of a stored configuration is lost. While one of its inputs does not answer, the device
@@ -285,6 +303,7 @@ int main(void)
     RUN_TEST(test_what_requires_an_input_rests_while_replacements_fail);
     RUN_TEST(test_a_link_that_cannot_be_made_holds_up_no_action);
     RUN_TEST(test_a_stand_in_that_stays_keeps_its_sole_access);
+    RUN_TEST(test_a_stand_in_goes_after_the_host_has_made_the_original);
     RUN_TEST(test_an_input_that_is_asked_for_is_silenced);
     return UNITY_END();
 }

@@ -1114,6 +1114,11 @@ bool pdcp_arb_links_settled(const pdcp_arb_t *arb)
     return pdcp_link_is_settled(&arb->bus);
 }
 
+bool pdcp_arb_link_running(const pdcp_arb_t *arb)
+{
+    return pdcp_link_is_making(&arb->bus);
+}
+
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {

@@ -142,6 +142,9 @@ void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pd
  * be silent (D-BUS-22). */
 bool pdcp_arb_links_settled(const pdcp_arb_t *arb);
 
+/* Is a link being made, or one that worked about to be made again? */
+bool pdcp_arb_link_running(const pdcp_arb_t *arb);
+
 /* Is a device being set up? */
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb);
 

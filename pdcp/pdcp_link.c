@@ -693,6 +693,7 @@ static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
         channel->feed = output;
         if (output == PDCP_NONE || !is_ready(bus, number)) {
             silence_again(bus, number);
+            pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, number, PDCP_ERR_NO_ANSWER);
             return;
         }
     } else if (channel->transfer != PDCP_INPUT) {
@@ -766,6 +767,18 @@ static bool has_work(const pdcp_bus_t *bus)
 bool pdcp_link_is_settled(const pdcp_bus_t *bus)
 {
     return (!bus->link.active || bus->link.kind == PDCP_TODO_AGAIN) && !has_work(bus);
+}
+
+bool pdcp_link_is_making(const pdcp_bus_t *bus)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *channel = &bus->nodes.channels[i];
+        if ((channel->todo & PDCP_TODO_CONNECT) != 0 &&
+            bus->nodes.nodes[channel->node].state == PDCP_NODE_READY) {
+            return true;
+        }
+    }
+    return bus->link.active && bus->link.kind == PDCP_TODO_CONNECT;
 }
 
 /* Everybody else comes first (D-BUS-22): a device that beacons and does not answer holds up nobody. But who

@@ -52,6 +52,9 @@ void pdcp_link_init(struct pdcp_bus *bus);
 /* Is there neither a job nor anything to do, but to silence again what does not answer? */
 bool pdcp_link_is_settled(const struct pdcp_bus *bus);
 
+/* Is a link being made, or to be made as soon as something else is done? */
+bool pdcp_link_is_making(const struct pdcp_bus *bus);
+
 /* Lets an active link rest: both ends disabled, source remembered (D-PRO-9). */
 void pdcp_link_rest(struct pdcp_bus *bus, uint8_t input);
 

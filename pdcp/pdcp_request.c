@@ -284,6 +284,17 @@ static bool on_packet(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *ms
     return !is_small;
 }
 
+/* Does an answer tell of another value than the one that this arbitrator has written by itself, so that it
+ * belongs to an earlier write? A device that repeats none, or less, is believed; what the host writes, a
+ * device may correct. */
+static bool tells_of_another_write(const pdcp_request_t *request, const pdcp_msg_t *msg)
+{
+    const size_t len = msg->len < request->size ? msg->len : request->size;
+    return request->code == PDCP_SET_PARAMETER && request->state == PDCP_REQUEST_ANSWER &&
+           (request->client == PDCP_CLIENT_LINK || request->client == PDCP_CLIENT_SETUP) &&
+           msg->result == PDCP_SUCCESS && memcmp(msg->value, request->value, len) != 0;
+}
+
 bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
     pdcp_node_t *device = pdcp_bus_node(bus, node);
@@ -294,7 +305,8 @@ bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *ms
     }
     if (msg->code != (code_of(request) | PDCP_ANSWER) ||
         (!is_packet(request) && /* 8E names no parameter */
-         (msg->param != request->param || msg->channel != request->channel))) {
+         (msg->param != request->param || msg->channel != request->channel)) ||
+        tells_of_another_write(request, msg)) {
         return late(bus);
     }
     pdcp_bus_count(bus, PDCP_STAT_TAKEN);

@@ -66,6 +66,7 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
 {
     uint8_t used[(PROFILE_PARTS_MAX + 7) / 8]; /* but for the entry that goes */
     const uint8_t old = profile_links_find(links, &link->input.owner, link->input.index);
+    const uint8_t stand_in = old != PDCP_NONE ? links->entries[old].stand_in : (uint8_t)PDCP_NONE;
     memset(used, 0, sizeof used);
     const profile_entry_t *at = links->entries;
     for (uint8_t i = 0; i < links->count; i++, at++) {
@@ -90,7 +91,7 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
     profile_entry_t *entry = insert(links, &link->input);
     put_end(links, &entry->input, input, &link->input);
     put_end(links, &entry->output, output, &link->output);
-    entry->stand_in = PDCP_NONE;
+    entry->stand_in = stand_in;
     entry->by_host = by_host;
     return true;
 }

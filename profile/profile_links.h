@@ -49,7 +49,8 @@ typedef struct {
 
 void profile_links_init(profile_links_t *links);
 
-/* Adds a link, in place of the one that its input has. False: no room, nothing is changed. */
+/* Adds a link, in place of the one that its input has; what stands in for that one is remembered, or it would
+ * stay for good. False: no room, nothing is changed. */
 bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool by_host);
 
 void profile_links_remove(profile_links_t *links, uint8_t entry);

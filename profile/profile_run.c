@@ -224,6 +224,20 @@ static void ban(profile_run_t *run, uint32_t now_ms)
     run->retry_ms = now_ms + PROFILE_RETRY_MS;
 }
 
+/* A link that worked does not any more, and nobody in this layer wanted that: an end is missing, which may
+ * have been lost before it beaconed, its device names another source, or does not answer. To make it again
+ * counts as its second try in the last case. */
+static void on_broken(profile_run_t *run, uint8_t input)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    run->plan.want[input] = PDCP_NONE;
+    if (profile_is_ready(nodes, input, PDCP_INPUT) &&
+        profile_is_ready(nodes, nodes->channels[input].feed, PDCP_OUTPUT)) {
+        run->tries = 1;
+    }
+    make_due(run, run->at_events);
+}
+
 /* A link that this layer has asked for is made, or is not. On a bad line, or when a device was away for a
  * moment, an answer is missing now and then, which must not lead to another limb: it is tried again. */
 static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
@@ -235,13 +249,15 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
         run->moves++;
         return;
     }
+    if (run->what == PROFILE_PLAN_ENFORCE) { /* it was lost meanwhile; the action ends without it */
+        on_broken(run, run->wish.input);
+        return;
+    }
     run->tries++;
     if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
         ban(run, now_ms);
     }
-    if (run->what != PROFILE_PLAN_ENFORCE) {
-        make_due(run, run->what);
-    }
+    make_due(run, run->what);
 }
 
 /* Is the working link of an input another one than the plan knows or wants? */
@@ -278,17 +294,34 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
     make_due(run, PROFILE_PLAN_SETTLE);
 }
 
-/* The link of an input has changed, by whomever. */
+/* Did the last plan, which is done, want a link that does not work any more? While it is about to be made
+ * again, it is not broken. */
+static bool is_broken(const profile_run_t *run, uint8_t input)
+{
+    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    return run->state == PROFILE_RUNNING && run->plan.want[input] != PDCP_NONE &&
+           channel->link != PDCP_LINK_ACTIVE && (channel->todo & PDCP_TODO_CONNECT) == 0;
+}
+
+/* The link of an input has changed, by whomever. That of a link which this layer has asked for comes with
+ * PDCP_EVENT_WISH. */
 static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
+    const uint8_t link = run->scene.nodes->channels[input].link;
     const uint8_t entry = entry_of(run, input);
     const bool dropping = profile_bit(run->dropping, input);
-    if (run->scene.nodes->channels[input].link == PDCP_LINK_NONE) {
+    if (link == PDCP_LINK_NONE) {
         profile_set_bit(run->dropping, input, false);
-        if (arb->bus.link.kind == PDCP_TODO_REMOVE && !dropping) {
-            on_removed(run, input, entry);
-        }
-    } else if (run->state != PROFILE_WAITING && !arb->bus.link.stored && !run->wishing && !dropping) {
+    }
+    if (dropping) {
+        return;
+    }
+    if (link == PDCP_LINK_NONE && arb->bus.link.kind == PDCP_TODO_REMOVE) {
+        on_removed(run, input, entry);
+    } else if (is_broken(run, input)) {
+        on_broken(run, input);
+    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_WAITING && !arb->bus.link.stored &&
+               !run->wishing) {
         on_asked(run, input, entry);
     }
 }
@@ -475,6 +508,61 @@ static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
 }
 
+/* Does a channel require an input of its device that is not connected? */
+static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
+{
+    const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
+    uint8_t c = owner->needs_stride != 0 ? owner->first_channel : (uint8_t)PDCP_NONE;
+    while (c != PDCP_NONE && (profile_feed(nodes, c) != PDCP_NONE ||
+                              !pdcp_nodes_needs(nodes, channel, false, nodes->channels[c].index))) {
+        c = nodes->channels[c].next;
+    }
+    return c != PDCP_NONE;
+}
+
+/* Is this a link of the host's, which needs nothing (D-PRO-9)? */
+static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
+{
+    const uint8_t entry = entry_of(run, input);
+    if (entry == PDCP_NONE) {
+        return false;
+    }
+    const profile_entry_t *own = &run->links.entries[entry];
+    return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, feed);
+}
+
+/* Does a link work that should not, because something that it requires is not connected? Links that the plan
+ * under way has made are left alone: those of a loop would never be made. */
+static bool is_lacking(const profile_run_t *run, uint8_t input)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const uint8_t feed = profile_feed(nodes, input);
+    return feed != PDCP_NONE && !profile_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
+           (misses_something(nodes, feed) || misses_something(nodes, input));
+}
+
+/* A plan may mean to connect what a working link requires, and most often that is done at once. When it does
+ * not go well, the link rests meanwhile (D-PRO-9): a device that does not answer may take long, and a hand
+ * would obey a controller that hears nothing. True: a link rests now. */
+static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
+{
+    bool rested = false;
+    uint8_t i = 0;
+    if (run->tries + run->scene.banned_count == 0 || run->what == PROFILE_PLAN_ENFORCE) {
+        return false;
+    }
+    while (i < PDCP_CHANNELS_MAX) {
+        if (is_lacking(run, i)) {
+            pdcp_arb_rest(arb, now_ms, i);
+            rested = true;
+            i = 0; /* others may require this one */
+        } else {
+            i++;
+        }
+    }
+    return rested;
+}
+
 /* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have
  * gone since the plan was made are the next plan's business. */
 static uint8_t next_input(const profile_run_t *run)
@@ -517,6 +605,9 @@ static bool carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     if (!pdcp_arb_links_settled(arb)) {
         return true;
     }
+    if (rest_lacking(run, arb, now_ms)) {
+        return true;
+    }
     const uint8_t input = next_input(run);
     if (input == PDCP_NONE) {
         finish(run);
@@ -553,12 +644,18 @@ static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
     return next_ms;
 }
 
-/* What the host has asked for is finished first. A plan for a new device waits for others that come with it.
- */
+/* A plan for a new device waits for others that come with it. */
+static bool awaits_arrivals(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
+{
+    return !run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms);
+}
+
+/* What the host has asked for is finished first: an action, or a link. A plan made while a link is half made
+ * would take it away again when it is whole; it could not be carried out earlier anyway. */
 static bool is_held_back(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    return run->what == PROFILE_PLAN_ENFORCE ||
-           (!run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms));
+    return run->what == PROFILE_PLAN_ENFORCE || pdcp_arb_link_running(arb) ||
+           awaits_arrivals(run, arb, now_ms);
 }
 
 bool profile_run_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
@@ -597,8 +694,8 @@ uint32_t profile_run_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, ui
         return now_ms;
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);
-    if (run->due != 0 && run->state != PROFILE_CONFIGURING && is_held_back(run, arb, now_ms)) {
-        return pdcp_time_earlier(next_ms, run->arrival_ms);
+    if (run->due == 0 || run->state == PROFILE_CONFIGURING || pdcp_arb_link_running(arb)) {
+        return next_ms;
     }
-    return next_ms;
+    return awaits_arrivals(run, arb, now_ms) ? pdcp_time_earlier(next_ms, run->arrival_ms) : now_ms;
 }

@@ -1,10 +1,11 @@
 /* The profile layer at work (profile-layer.md 4): when to plan, and how a plan becomes bus traffic.
  *
- * It waits for the start-up, then plans whenever a device is lost or has been set up. A step makes one slice
- * of a plan; when the tables have changed before it is done, it is begun anew (D-PRO-23). Of a plan that is
- * done it carries out one link after the other. A link that cannot be made is banned and the plan is made
- * anew, without what the failed one has made (D-PRO-5). What it knows of stored configurations its owner
- * tells it (arb_limb.h).
+ * It waits for the start-up, then plans whenever a device is lost or has been set up, or a link that worked
+ * does not any more. A step makes one slice of a plan; when the tables have changed before it is done, it is
+ * begun anew (D-PRO-23). Of a plan that is done it carries out one link after the other. A link that cannot
+ * be made is banned and the plan is made anew, without what the failed one has made (D-PRO-5); while links
+ * fail, those that require what is not connected rest (D-PRO-9). What it knows of stored configurations its
+ * owner tells it (arb_limb.h).
  */
 #ifndef PROFILE_RUN_H
 #define PROFILE_RUN_H

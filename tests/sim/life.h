@@ -187,6 +187,10 @@ typedef struct {
 /* After each millisecond: counters never go down, the arbitrator does not run in circles. */
 void life_check_counters(life_counters_t *counters, const arb_app_t *app, uint32_t now_ms);
 
+/* After each millisecond: no channel goes on hearing or sending without a link, unless something is pending
+ * or under way that ends it (D-BUS-14, D-BUS-22). */
+void life_check_silences(const limb_t *limb);
+
 /* When all has been calm: tables and devices agree, and nothing is under way. */
 void life_check_calm(const limb_t *limb);
 

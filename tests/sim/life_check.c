@@ -154,6 +154,32 @@ static void check_active(const limb_t *limb, const limb_part_t *part, const pdcp
     }
 }
 
+/* Is something pending or under way that silences a channel? A job sees to the output that its input has
+ * heard so far, too. */
+static bool is_being_silenced(const limb_t *limb, uint8_t number)
+{
+    const unsigned todo = nodes_of(limb)->channels[number].todo;
+    const pdcp_link_t *job = &limb->app.arb.bus.link;
+    return (todo & ~(unsigned)PDCP_TODO_UPDATE) != 0 ||
+           (job->active && (job->input == number || job->output == number || job->old_feed == number));
+}
+
+void life_check_silences(const limb_t *limb)
+{
+    const pdcp_nodes_t *nodes = nodes_of(limb);
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *channel = &nodes->channels[i];
+        if (channel->node == PDCP_NONE || nodes->nodes[channel->node].state != PDCP_NODE_READY) {
+            continue;
+        }
+        const limb_part_t *part = owner_of(limb, channel);
+        if (part->node != NULL && pdcp_device_channel(sim_node_device(part->node), channel->index)->enabled &&
+            !is_active(channel) && !is_fed(limb, channel) && !is_being_silenced(limb, i)) {
+            complain(limb, part, channel->index, "enabled without a link, and nothing ends it");
+        }
+    }
+}
+
 /* Has the host made this link, so that it may lack what it requires (D-PRO-9)? */
 static bool is_hosts(const limb_t *limb, const limb_part_t *part, uint8_t index)
 {

@@ -679,6 +679,7 @@ static void pass_ms(void)
     }
     life_host_step(&life.host, &life.limb, life.ms);
     life_check_counters(&life.counters, &life.limb.app, sim_world_ms(&life.limb.world));
+    life_check_silences(&life.limb);
 }
 
 static void begin_life(uint32_t seed)

@@ -583,6 +583,44 @@ static void test_update_data_channel_does_not_end_the_silencing(void)
     TEST_ASSERT_FALSE(the_input()->enabled);
 }
 
+/* A link that was to be made again, and whose source has gone before its turn: that is told, and the input is
+ * silenced. */
+static void test_a_link_whose_source_has_gone_is_not_made(void)
+{
+    pdcp_channel_t *channel = &x.arb->bus.nodes.channels[input()];
+    channel->link = PDCP_LINK_INACTIVE;
+    channel->enabled = true;
+    channel->todo = PDCP_TODO_CONNECT;
+    x.arb->bus.link.due = true;
+    exchange_step(&x);
+    exchange_tx(&x, "312#04 04 01 00");
+    TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_LINK)->channel);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK)->status);
+}
+
+/* A device was slow: the answer to an earlier write of the parameter, given up meanwhile, comes while another
+ * value is being written, which may get lost. It must not be taken for the answer to that. */
+static void test_an_answer_that_tells_of_another_value_is_late(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    for (int i = 0; i < 3; i++) {
+        exchange_tx(&x, making[i].tx);
+        exchange_rx(&x, making[i].rx);
+    }
+    exchange_tx(&x, "312#04 07 01 11 FE");
+    exchange_rx(&x, "212#84 01 07 01 13 FD"); /* another source */
+    exchange_silence(&x);
+    exchange_rx(&x, "212#84 01 07 01"); /* as older devices answer: no value (D-BUS-3) */
+    exchange_tx(&x, "312#04 04 01 01");
+    exchange_rx(&x, "212#84 01 04 01 00");
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(2, x.arb->bus.stats[PDCP_STAT_DROP_LATE]);
+    exchange_pass(&x, 100);
+    exchange_tx(&x, "312#04 04 01 01");
+    exchange_rx(&x, "212#84 01 04 01 01 00 00 00");
+    exchange_tx(&x, "311#04 04 01 01");
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -612,5 +650,7 @@ int main(void)
     RUN_TEST(test_a_link_waits_for_the_hosts_request);
     RUN_TEST(test_update_data_channel_does_not_keep_an_input_from_being_silenced);
     RUN_TEST(test_update_data_channel_does_not_end_the_silencing);
+    RUN_TEST(test_a_link_whose_source_has_gone_is_not_made);
+    RUN_TEST(test_an_answer_that_tells_of_another_value_is_late);
     return UNITY_END();
 }

@@ -681,6 +681,7 @@ static void test_lives(void)
     uint64_t changes = 0;
     uint64_t frames = 0;
     uint64_t events_told = 0;
+    uint64_t taken = 0;
     uint32_t longest_ms = 0;
     for (uint32_t seed = first_seed; seed < first_seed + seeds; seed++) {
         begin_life(seed);
@@ -691,6 +692,7 @@ static void test_lives(void)
         changes += life.memory.changes;
         frames += life.frames;
         events_told += life.host.events;
+        taken += life.watch.taken;
         longest_ms = life.host.longest_ms > longest_ms ? life.host.longest_ms : longest_ms;
         limb_end(&life.limb);
     }
@@ -701,6 +703,9 @@ static void test_lives(void)
         (unsigned)seeds, (STORM_MS + CALM_MS + WATCH_MS) / 1000, (unsigned long long)frames,
         (unsigned long long)asked, (unsigned long long)failed, (unsigned)longest_ms,
         (unsigned long long)events_told, (unsigned long long)changes);
+    if (life_is_on(LIFE_VALUES)) {
+        (void)printf("%llu values, each of them of the input's source\n", (unsigned long long)taken);
+    }
 }
 
 /* The same with all that holds. */

@@ -22,11 +22,19 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
     }
 }
 
+/* Parts of a stored configuration keep their places when strangers crowd in (D-BUS-43). */
+static bool knows(void *ctx, const pdcp_identity_t *identity)
+{
+    const arb_app_t *app = ctx;
+    return arb_config_names(&app->limb.config, identity);
+}
+
 void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings, uint32_t now_ms)
 {
     memset(app, 0, sizeof *app);
     app->work = true;
-    pdcp_arb_init(&app->arb, now_ms, settings->serial, on_event, app);
+    pdcp_arb_init(&app->arb, now_ms, settings->serial, settings->seed, on_event, app);
+    pdcp_arb_know(&app->arb, knows);
     arb_nvm_init(&app->nvm, port);
     arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
     arb_limb_init(&app->limb, &app->arb.bus.nodes, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,

@@ -15,6 +15,7 @@
 
 typedef struct {
     uint32_t serial; /* of this arbitrator: tells two on one bus apart (D-BUS-12) */
+    uint32_t seed;   /* differs from start to start: where the ids of outputs begin (D-BUS-36) */
     /* The command line's word, which overrides the stored flags of 2404h without being stored. */
     bool strict_crc;    /* refuse host messages with wrong checksums (D-API-1) */
     bool no_autoconfig; /* terminal channels are not linked by themselves */

@@ -93,6 +93,7 @@ static bool adopt(arb_config_t *config, const uint8_t header[ARB_CONFIG_HEADER])
         config->length = config->until;
         config->crc = config->crc_read;
         memcpy(config->numbers, config->reader.numbers, sizeof config->numbers);
+        memcpy(config->names, config->reader.names, sizeof config->names);
         config->stored = config->reader.configurations_read;
     }
     return true;

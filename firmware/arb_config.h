@@ -76,6 +76,7 @@ typedef struct {
     uint32_t counters[ARB_CONFIG_COUNTERS];
     /* What is stored. */
     uint8_t numbers[PROFILE_TLV_SET_BYTES]; /* of the configurations, a bit for each (profile_tlv_has) */
+    uint8_t names[PROFILE_TLV_NAMES_BYTES]; /* the devices in them (profile_tlv_names) */
     uint8_t stored;                         /* how many there are */
     arb_area_t newest;
     uint16_t length;
@@ -133,6 +134,13 @@ static inline uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t n
 static inline bool arb_config_has(const arb_config_t *config, uint8_t number)
 {
     return profile_tlv_has(config->numbers, number);
+}
+
+/* Whether this device is part of a stored configuration; now and then of one that is not, too
+ * (profile_tlv_names). */
+static inline bool arb_config_names(const arb_config_t *config, const pdcp_identity_t *identity)
+{
+    return profile_tlv_names(config->names, identity);
 }
 
 /* A job begins with the first step after its start. */

@@ -130,29 +130,6 @@ uint8_t arb_hostbus_set_parameter(arb_call_t *call)
     return parameter(call, true);
 }
 
-/* Would the output feed a second input that wants it for itself? An inactive link counts: it comes back. */
-static bool breaks_sole_access(const arb_call_t *call, const pdcp_channel_t *input)
-{
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const pdcp_identity_t *source = &nodes->nodes[call->place[0]].identity;
-    const pdcp_channel_t *other = nodes->channels;
-    bool claimed = false;
-    if (!profile_is_sole(input)) {
-        return false;
-    }
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, other++) {
-        if (other->link == PDCP_LINK_NONE || other->source_index != call->payload[6] ||
-            !pdcp_identity_equal(&other->source, source) || !profile_is_sole(other)) {
-            continue;
-        }
-        if (other == input) {
-            return false;
-        }
-        claimed = true;
-    }
-    return claimed;
-}
-
 /* Why there is no link to be made: an output whose device could not be set up because all node ids are given
  * out is one without a node id. */
 static uint8_t error_of_ends(const arb_call_t *call)
@@ -183,11 +160,11 @@ uint8_t arb_hostbus_configure_link(arb_call_t *call)
     if (call->place[0] == call->place[1]) {
         return ARB_ERR_VALUE;
     }
-    if (breaks_sole_access(call, &call->arb->bus.nodes.channels[input])) {
+    const pdcp_status_t status = pdcp_arb_connect_sole(call->arb, output, input);
+    if (status == PDCP_ERR_SOLE) {
         return ARB_ERR_SOLE_ACCESS;
     }
-    return pdcp_arb_connect(call->arb, output, input) == PDCP_OK ? arb_call_started(call)
-                                                                 : arb_call_wait_ready(call);
+    return status == PDCP_OK ? arb_call_started(call) : arb_call_wait_ready(call);
 }
 
 /* To all devices: Suspend (with its time) or Release only [PDCP 3.2.4, 3.2.5]. */

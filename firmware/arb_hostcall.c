@@ -41,10 +41,8 @@ uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
     const pdcp_identity_t identity = arb_host_get_identity(bytes);
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t place = pdcp_nodes_find(nodes, &identity);
-    if (place != PDCP_NONE && nodes->nodes[place].state == PDCP_NODE_LOST) {
-        return PDCP_NONE;
-    }
-    return place;
+    const uint8_t state = place != PDCP_NONE ? nodes->nodes[place].state : (uint8_t)PDCP_NODE_LOST;
+    return state != PDCP_NODE_LOST && state != PDCP_NODE_ASKED ? place : (uint8_t)PDCP_NONE;
 }
 
 uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
@@ -65,6 +63,8 @@ uint8_t arb_call_error(int8_t status)
         return ARB_ERR_BULK;
     case PDCP_ERR_BUSY:
         return ARB_ERR_BUSY;
+    case PDCP_ERR_SOLE:
+        return ARB_ERR_SOLE_ACCESS;
     default:
         return ARB_ERR_NO_ANSWER;
     }

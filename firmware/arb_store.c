@@ -40,11 +40,17 @@ void arb_store_touch(arb_store_t *store, uint32_t now_ms)
     store->changed = true;
     store->copy.written = 0; /* a copy under way is out of date: its area is written from the start */
     store->due_ms = now_ms + ARB_STORE_DELAY_MS;
+    if (store->pausing && pdcp_time_before(store->due_ms, store->pause_ms)) {
+        store->due_ms = store->pause_ms;
+    }
     arb_nvm_give(store->nvm, ARB_NVM_STORE);
 }
 
 void arb_store_step(arb_store_t *store, const pdcp_bind_t *bind, uint32_t now_ms)
 {
+    if (store->pausing && pdcp_time_reached(now_ms, store->pause_ms)) {
+        store->pausing = false;
+    }
     if (!store->changed) {
         return;
     }
@@ -55,6 +61,8 @@ void arb_store_step(arb_store_t *store, const pdcp_bind_t *bind, uint32_t now_ms
     if (status == 0 && store->copy.written == arb_record_length(&store_record, bind->remembered_count)) {
         arb_record_written(&store->newest);
         store->changed = false;
+        store->pausing = true;
+        store->pause_ms = now_ms + ARB_STORE_PAUSE_MS;
         arb_nvm_give(store->nvm, ARB_NVM_STORE);
     } else if ((status < 0 && store->copy.written != 0) ||
                !arb_record_write(&store_record, store->nvm, &store->newest, bind->remembered_count, bind,

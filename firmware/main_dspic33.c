@@ -119,7 +119,7 @@ static void start(firmware_t *self)
                               .nvm_write = nvm_write,
                               .nvm_status = nvm_status,
                               .counter = counter};
-    const arb_settings_t settings = {.serial = hal_sys_serial()};
+    const arb_settings_t settings = {.serial = hal_sys_serial(), .seed = hal_sys_random()};
     arb_app_init(&self->app, &self->port, &settings, hal_clock_ms());
     /* Last: that reads the EEPROM, and frames that came meanwhile would be old or lost. Now they are
      * repeated. */

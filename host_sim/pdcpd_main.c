@@ -380,6 +380,7 @@ static bool start(daemon_t *daemon)
                                 .nvm_status = nvm_status,
                                 .counter = counter};
     const arb_settings_t settings = {.serial = hal_sys_serial(),
+                                     .seed = hal_sys_random(),
                                      .strict_crc = daemon->options.strict_crc,
                                      .no_autoconfig = daemon->options.no_autoconfig};
     const uint32_t now_ms = (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);

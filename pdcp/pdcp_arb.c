@@ -6,31 +6,47 @@
 #include "pdcp_setup.h"
 #include "pdcp_time.h"
 
-/* Nothing is known of the bus; what is remembered and counted stays. */
+/* Nothing is known of the bus; what is remembered and counted stays. Its devices may still speak. */
 static void forget_bus(pdcp_arb_t *arb)
 {
+    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+        if (arb->bus.nodes.owner[id] != 0) {
+            pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+        }
+    }
+    arb->bus.bind.shut = pdcp_unknown_any(&arb->bus.unknown);
     pdcp_nodes_init(&arb->bus.nodes);
     for (int i = 0; i < PDCP_TIMER_RECOVERY; i++) { /* a controller that is off leaves that state */
         pdcp_timers_cancel(&arb->bus.timers, (uint8_t)i);
     }
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->bus);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_LINK, PDCP_CLOSED_MS);
     memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
-    memset(arb->strangers, 0, sizeof arb->strangers);
     arb->asked_ms = arb->bus.now_ms;
-    arb->started_ms = arb->bus.now_ms;
-    arb->young = true;
+    arb->bus.started_ms = arb->bus.now_ms;
+    arb->beacon_ms = arb->bus.now_ms;
+    arb->held_ms = 0;
+    arb->listening = false;
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
 }
 
-void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx)
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t seed, pdcp_event_fn on_event,
+                   void *ctx)
 {
     memset(arb, 0, sizeof *arb);
     arb->bus.now_ms = now_ms;
     arb->bus.on_event = on_event;
     arb->bus.event_ctx = ctx;
-    arb->spread_ms = (uint16_t)(serial % PDCP_STANDBY_SPREAD_MS);
+    arb->serial = serial;
+    pdcp_unknown_init(&arb->bus.unknown, now_ms);
+    pdcp_bind_init(&arb->bus.bind, seed);
     forget_bus(arb);
+}
+
+void pdcp_arb_know(pdcp_arb_t *arb, pdcp_knows_fn knows)
+{
+    arb->bus.knows = knows;
 }
 
 static void count(pdcp_arb_t *arb, pdcp_stat_t stat)
@@ -137,6 +153,9 @@ static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
         take_down(arb, node); /* it was reset: what was known of its channels' state is gone */
     }
     begin_setup(arb, node);
+    if (!pdcp_bind_is_known(&arb->bus, &node_of(arb, node)->identity)) {
+        set_life(arb, node, PDCP_GHOST_MS);
+    }
 }
 
 static void start_host_request(pdcp_arb_t *arb)
@@ -158,7 +177,7 @@ static void serve(pdcp_arb_t *arb, uint8_t node)
     }
     if (device->asked_again) {
         pdcp_request_get(&arb->bus, node, PDCP_CLIENT_BIND, 0, PDCP_DEV_VID_PID, PDCP_VALUE_MAX);
-        pdcp_request_try_once(&arb->bus, node);
+        pdcp_request_limit_tries(&arb->bus, node, PDCP_CHECK_TRIES);
         return;
     }
     if (arb->host.waiting && arb->host.node == node) {
@@ -185,6 +204,99 @@ static bool is_beacon(const can_frame_t *frame)
     return frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
 }
 
+static bool is_reset_answer(const can_frame_t *frame)
+{
+    return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
+}
+
+/* Places in this state. */
+static uint8_t count_state(const pdcp_arb_t *arb, pdcp_node_state_t state)
+{
+    uint8_t places = 0;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        places = (uint8_t)(places + (arb->bus.nodes.nodes[i].state == (uint8_t)state));
+    }
+    return places;
+}
+
+/* Has it granted an id to a device (D-BUS-42)? */
+static bool has_own(const pdcp_arb_t *arb)
+{
+    return count_state(arb, PDCP_NODE_FREE) + count_state(arb, PDCP_NODE_ASKED) != PDCP_DEVICES_MAX;
+}
+
+static uint16_t own_hold_ms(const pdcp_arb_t *arb)
+{
+    return (uint16_t)(PDCP_HOLD_MS + arb->serial % PDCP_HOLD_SPREAD_MS);
+}
+
+/* How much longer the answer to a bind request is held that came now: another arbitrator may be there and
+ * answer it (D-BUS-42). */
+static uint16_t hold_ms(const pdcp_arb_t *arb)
+{
+    const uint16_t own_ms = own_hold_ms(arb);
+    const uint32_t heard_ms = arb->bus.now_ms - arb->standby.since_ms;
+    const bool waits = pdcp_standby_is_heard(&arb->standby, arb->bus.now_ms) && !arb->standby.doubted;
+    return waits && heard_ms < PDCP_HOLD_FOREIGN_MS ? (uint16_t)(own_ms + PDCP_HOLD_FOREIGN_MS - heard_ms)
+                                                    : own_ms;
+}
+
+/* Place of the identity whose request is held; PDCP_NONE: it is not. */
+static uint8_t held_place(const pdcp_arb_t *arb, const pdcp_identity_t *identity)
+{
+    const uint8_t place = pdcp_nodes_find(&arb->bus.nodes, identity);
+    return place != PDCP_NONE && arb->bus.nodes.nodes[place].state == PDCP_NODE_ASKED ? place
+                                                                                      : (uint8_t)PDCP_NONE;
+}
+
+static void drop_held(pdcp_arb_t *arb, uint8_t place)
+{
+    pdcp_timers_cancel(&arb->bus.timers, (uint8_t)(PDCP_TIMER_LIFE + place));
+    pdcp_nodes_remove(&arb->bus.nodes, place);
+}
+
+static void bind(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
+{
+    uint8_t node;
+    const pdcp_bind_result_t result = pdcp_bind_on_request(&arb->bus, identity, asked, &node);
+    after_bind(arb, node, result);
+    if (node != PDCP_NONE) {
+        serve(arb, node);
+    }
+}
+
+/* An arbitrator without devices of its own lets another one go first. Without a place the device asks again.
+ */
+static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
+{
+    const uint8_t place = pdcp_nodes_free_place(&arb->bus.nodes);
+    if (place == PDCP_NONE) {
+        count(arb, PDCP_STAT_NO_ROOM);
+        return;
+    }
+    pdcp_nodes_hold(&arb->bus.nodes, place, identity);
+    node_of(arb, place)->asked_id = asked;
+    set_life(arb, place, hold_ms(arb));
+}
+
+/* Nobody else has answered the request that is held. Of many that came together a few are set up at once, the
+ * others follow one by one: they would only wait for each other. */
+static void on_held(pdcp_arb_t *arb, uint8_t place)
+{
+    const pdcp_node_t held = *node_of(arb, place);
+    arb->held_ms = own_hold_ms(arb);
+    drop_held(arb, place);
+    bind(arb, &held.identity, held.asked_id);
+    if (count_state(arb, PDCP_NODE_SETUP) < PDCP_HOLD_SETUPS) {
+        return;
+    }
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (node_of(arb, i)->state == PDCP_NODE_ASKED) {
+            set_life(arb, i, PDCP_HOLD_PACE_MS);
+        }
+    }
+}
+
 static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
@@ -197,71 +309,44 @@ static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
         count(arb, PDCP_STAT_DROP_BAD_DLC);
         return;
     }
-    uint8_t node;
     count(arb, PDCP_STAT_TAKEN);
     arb->asked_ms = arb->bus.now_ms;
-    const pdcp_bind_result_t result =
-        pdcp_bind_on_request(&arb->bus, &msg.identity, pdcp_id_node(frame->id), &node);
-    after_bind(arb, node, result);
-    if (node != PDCP_NONE) {
-        serve(arb, node);
+    const uint8_t place = held_place(arb, &msg.identity);
+    if (place != PDCP_NONE) { /* the newer request replaces the older one */
+        drop_held(arb, place);
+    }
+    if (has_own(arb)) {
+        bind(arb, &msg.identity, pdcp_id_node(frame->id));
+    } else {
+        hold(arb, &msg.identity, pdcp_id_node(frame->id));
     }
 }
 
-/* Asked at least with every beacon, so that started_ms is never compared after 24.8 days. */
-static bool is_young(pdcp_arb_t *arb)
+static bool is_young(const pdcp_arb_t *arb)
 {
-    if (pdcp_time_reached(arb->bus.now_ms, arb->started_ms + PDCP_YOUNG_MS)) {
-        arb->young = false;
-    }
-    return arb->young;
+    return pdcp_bus_age_ms(&arb->bus) < PDCP_YOUNG_MS;
 }
 
-static void forget_strangers(pdcp_arb_t *arb)
-{
-    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (pdcp_time_reached(arb->bus.now_ms, arb->strangers[i].until_ms)) {
-            arb->strangers[i].node_id = 0;
-        }
-    }
-}
-
-/* Tells the device with this id to reset, at most once a second (D-BUS-15). It will then bind. */
+/* Tells the device with this id to reset, at most once a second (D-BUS-15, D-BUS-37). It will then bind. */
 static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
 {
-    pdcp_stranger_t *entry = NULL;
-    forget_strangers(arb);
-    for (uint8_t i = 0; i < PDCP_STRANGERS_MAX; i++) {
-        if (arb->strangers[i].node_id == id) {
-            return;
-        }
-        if (arb->strangers[i].node_id == 0) {
-            entry = &arb->strangers[i];
-        }
+    if (!pdcp_unknown_tell(&arb->bus.unknown, arb->bus.now_ms, id)) {
+        return;
     }
-    if (entry == NULL) {
-        return; /* its turn comes within a second: nobody is told twice */
-    }
-    entry->node_id = id;
-    entry->until_ms = arb->bus.now_ms + PDCP_STRANGER_PAUSE_MS;
     if (send(arb, PDCP_PRIORITY_NORMAL, id, PDCP_RESET, 0)) {
         count(arb, PDCP_STAT_STRANGER_RESET);
     }
 }
 
-/* A frame from an id that is not bound. True: there is something to be sent. */
-static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
+/* Without a bus what waits is stale when there is one again; requests repeat themselves, and an answer to
+ * what has been given up long ago would be taken for that to a newer one. */
+static void discard_queue(pdcp_arb_t *arb)
 {
-    const uint8_t id = pdcp_id_node(frame->id);
-    count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
-    if (!is_beacon(frame) || id < PDCP_NODE_MIN || id > PDCP_NODE_MAX || is_young(arb)) {
-        return false;
-    }
-    reset_stranger(arb, id);
-    return true;
+    arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
+    pdcp_txq_init(&arb->bus.txq);
 }
 
-/* D-BUS-12: this arbitrator falls silent; the host, if it waits, is told. */
+/* D-BUS-42: this arbitrator goes on standby; the host, if it waits, is told. */
 static void go_silent(pdcp_arb_t *arb)
 {
     arb->silent = true;
@@ -270,35 +355,158 @@ static void go_silent(pdcp_arb_t *arb)
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
     forget_bus(arb);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
+                  (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
     pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
 }
 
-/* D-BUS-12: heard soon after the own start, another arbitrator was there first; heard later, this one was. */
+/* The standby is over: the other arbitrator is gone, or serves no longer (D-BUS-42). */
+static void take_over(pdcp_arb_t *arb)
+{
+    arb->silent = false;
+    forget_bus(arb);
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
+}
+
+/* Without devices of its own an arbitrator goes on standby when another one serves. With some it stays; but
+ * when two with devices of their own hear each other for long, the one whose time comes first yields. That
+ * the other one has devices is seen when one answers it: beacons alone, which may be forged, take no limb its
+ * arbitrator (D-BUS-42). */
+static bool is_to_yield(const pdcp_arb_t *arb)
+{
+    const uint32_t now_ms = arb->bus.now_ms;
+    const uint32_t stays_ms = PDCP_YIELD_MS + arb->serial % PDCP_YIELD_SPREAD_MS;
+    if (has_own(arb)) {
+        return pdcp_standby_is_answered(&arb->standby, now_ms) && now_ms - arb->standby.since_ms >= stays_ms;
+    }
+    return pdcp_standby_serves(&arb->standby, now_ms);
+}
+
 static void on_foreign_beacon(pdcp_arb_t *arb)
 {
-    const bool again = arb->foreign && pdcp_time_before(arb->bus.now_ms, arb->foreign_ms + PDCP_STANDBY_MS);
     count(arb, PDCP_STAT_FOREIGN_BEACON);
-    arb->foreign = true;
-    arb->foreign_ms = arb->bus.now_ms;
-    if (!arb->silent && is_young(arb)) {
-        go_silent(arb);
-    } else if (!arb->silent && !again) {
+    const bool is_first = pdcp_standby_on_beacon(&arb->standby, arb->bus.now_ms);
+    if (arb->silent) {
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
+                      (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
+        return;
+    }
+    if (is_first) {
         pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_FOREIGN, PDCP_NONE);
     }
+    if (is_to_yield(arb)) {
+        go_silent(arb);
+    }
+}
+
+/* Another arbitrator has answered a bind request: what is held of this identity is its business. */
+static void on_foreign_grant(pdcp_arb_t *arb, const pdcp_identity_t *identity)
+{
+    const uint8_t place = held_place(arb, identity);
+    if (place != PDCP_NONE) {
+        drop_held(arb, place);
+    }
     if (arb->silent) {
-        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, (uint16_t)(PDCP_STANDBY_MS + arb->spread_ms));
+        pdcp_standby_on_sign_of_life(&arb->standby);
+        pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_STANDBY);
+    }
+}
+
+/* A frame of a device may answer another arbitrator. */
+static void on_foreign_answer(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    if (pdcp_id_node(frame->id) != arb->standby.asked_id || arb->standby.asked_id == 0 ||
+        !pdcp_standby_on_answer(&arb->standby, arb->bus.now_ms, frame)) {
+        return;
+    }
+    if (arb->silent) {
+        pdcp_standby_on_sign_of_life(&arb->standby);
+    } else if (is_to_yield(arb)) {
+        go_silent(arb);
     }
 }
 
 static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
+    pdcp_msg_t msg;
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         count(arb, PDCP_STAT_DROP_UNUSED_ID);
-    } else if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && is_beacon(frame)) {
-        on_foreign_beacon(arb);
-    } else {
-        count(arb, PDCP_STAT_DROP_ARBITRATOR);
+        return;
     }
+    if (frame->id == pdcp_can_id(PDCP_PRIORITY_HIGH, true, PDCP_NODE_BROADCAST) && is_beacon(frame)) {
+        on_foreign_beacon(arb);
+        return;
+    }
+    count(arb, PDCP_STAT_DROP_ARBITRATOR);
+    if (pdcp_decode(frame, &msg) == PDCP_DECODE_OK && msg.code == (PDCP_BIND_DEVICE | PDCP_ANSWER)) {
+        on_foreign_grant(arb, &msg.identity);
+    } else {
+        pdcp_standby_on_request(&arb->standby, frame);
+    }
+}
+
+/* On standby, a bind request that stays without an answer may mean that the other arbitrator serves no
+ * longer. True: it is waited for. */
+static bool on_frame_on_standby(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    count(arb, PDCP_STAT_DROP_SILENT);
+    if (pdcp_id_priority(frame->id) != PDCP_PRIORITY_BINDING) {
+        pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, pdcp_id_node(frame->id));
+        on_foreign_answer(arb, frame);
+        return false;
+    }
+    if (!pdcp_timers_is_set(&arb->bus.timers, PDCP_TIMER_STANDBY)) {
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_STANDBY, PDCP_UNBOUND_WAIT_MS);
+    }
+    return true;
+}
+
+/* Its own beacons have not left for too long: others may have taken over. It sends nothing and listens
+ * (D-BUS-42). */
+static void listen(pdcp_arb_t *arb)
+{
+    arb->listening = true;
+    discard_queue(arb);
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_STANDBY, PDCP_LISTEN_MS);
+}
+
+static void on_standby_deadline(pdcp_arb_t *arb)
+{
+    const uint32_t now_ms = arb->bus.now_ms;
+    if (arb->silent) {
+        if (pdcp_standby_on_unbound(&arb->standby, now_ms, now_ms - PDCP_UNBOUND_WAIT_MS)) {
+            take_over(arb);
+        }
+    } else if (pdcp_standby_serves(&arb->standby, now_ms)) {
+        go_silent(arb);
+    } else {
+        arb->listening = false;
+        arb->beacon_ms = now_ms;
+        discard_queue(arb);
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
+    }
+}
+
+/* A frame from an id that is not bound. True: there is something to be sent. */
+static bool on_stranger(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    const uint8_t id = pdcp_id_node(frame->id);
+    count(arb, PDCP_STAT_DROP_UNKNOWN_ID);
+    if (id < PDCP_NODE_MIN || id > PDCP_NODE_MAX) {
+        return false;
+    }
+    arb->bus.bind.shut = arb->bus.bind.shut || pdcp_bus_age_ms(&arb->bus) < PDCP_SHUT_MS;
+    if (is_reset_answer(frame)) {
+        pdcp_unknown_note_answer(&arb->bus.unknown, arb->bus.now_ms, id);
+    } else {
+        pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
+    }
+    on_foreign_answer(arb, frame);
+    if (!is_beacon(frame) || arb->silent || is_young(arb)) {
+        return arb->silent;
+    }
+    reset_stranger(arb, id);
+    return true;
 }
 
 /* The counters stand in the order of the kinds. */
@@ -308,20 +516,19 @@ static void on_other_kind(pdcp_arb_t *arb, const can_frame_t *frame)
 }
 
 /* True: it was the first one, or the device was lost. */
-static bool on_beacon(pdcp_arb_t *arb, uint8_t node)
+static bool on_beacon(pdcp_arb_t *arb, pdcp_node_t *device)
 {
-    pdcp_node_t *device = node_of(arb, node);
     count(arb, PDCP_STAT_TAKEN);
     if (device->beaconed && device->state != PDCP_NODE_LOST) {
         return false;
     }
     if (device->state == PDCP_NODE_LOST) {
-        begin_setup(arb, node); /* reads who it is before anything else (D-BUS-15) */
+        begin_setup(arb, device->place); /* reads who it is before anything else (D-BUS-15) */
         device->taken_back = true;
-        serve(arb, node);
+        serve(arb, device->place);
     }
     device->beaconed = true;
-    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_BOUND, node);
+    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_BOUND, device->place);
     return true;
 }
 
@@ -410,6 +617,7 @@ static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
         expect_life(arb, node);
     }
     if (device->state == PDCP_NODE_READY) {
+        pdcp_bind_on_ready(&arb->bus, device);
         pdcp_link_on_ready(&arb->bus, node);
     } else if (device->state == PDCP_NODE_FAILED) {
         arb->bus.link.due = true; /* an Update Data Channel may have waited for it */
@@ -458,6 +666,7 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
+    on_foreign_answer(arb, frame);
     bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
     if (!replied) {
         const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
@@ -482,6 +691,36 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
     }
 }
 
+/* A frame on the id of an output. It is a stranger's if the output's device is lost, or the output was told
+ * to be silent and has had time to be: then it says nothing of the owner, and the output gets another id
+ * before it is enabled (D-BUS-36). */
+static bool on_channel_data(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
+{
+    pdcp_node_t *device = node_of(arb, node);
+    pdcp_channel_t *output =
+        &arb->bus.nodes.channels[pdcp_nodes_output(&arb->bus.nodes, node, pdcp_id_node(frame->id))];
+    const bool is_silenced = device->state == PDCP_NODE_READY && !output->enabled &&
+                             arb->bus.now_ms - arb->bus.silenced_ms >= PDCP_FADING_MS;
+    if (is_silenced || device->state == PDCP_NODE_LOST) {
+        pdcp_bind_take_output_id(&arb->bus, output);
+        return on_stranger(arb, frame);
+    }
+    device->heard_ms = arb->bus.now_ms;
+    count(arb, PDCP_STAT_CHANNEL_DATA);
+    return false;
+}
+
+/* A frame came from a bound id whose identity asks again, and was no answer to the request under way:
+ * whatever it says, its owner is alive (D-BUS-41). */
+static void end_check(pdcp_arb_t *arb, uint8_t node)
+{
+    if (node_of(arb, node)->request.client == PDCP_CLIENT_BIND) {
+        pdcp_request_cancel(&arb->bus, node);
+    }
+    (void)conclude_check(arb, node, PDCP_OK);
+    serve(arb, node);
+}
+
 bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *frame)
 {
     arb->bus.now_ms = now_ms;
@@ -495,8 +734,7 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         return arb->silent;
     }
     if (arb->silent) {
-        count(arb, PDCP_STAT_DROP_SILENT);
-        return false;
+        return on_frame_on_standby(arb, frame);
     }
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
         on_bind_frame(arb, frame);
@@ -507,16 +745,22 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
     if (node >= PDCP_DEVICES_MAX) {
         return on_stranger(arb, frame);
     }
-    node_of(arb, node)->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
+    pdcp_node_t *device = node_of(arb, node);
     if (!is_device) {
-        count(arb, PDCP_STAT_CHANNEL_DATA);
-        return false;
+        return on_channel_data(arb, node, frame);
     }
+    device->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
+    bool due = true;
     if (is_beacon(frame)) {
-        return on_beacon(arb, node); /* by far the most frequent: without decoding */
+        due = on_beacon(arb, device); /* by far the most frequent: without decoding */
+    } else {
+        on_message(arb, node, frame);
     }
-    on_message(arb, node, frame);
-    return true;
+    if (device->asked_again) {
+        end_check(arb, node);
+        due = true;
+    }
+    return due;
 }
 
 static void send_beacon(pdcp_arb_t *arb)
@@ -525,28 +769,54 @@ static void send_beacon(pdcp_arb_t *arb)
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, PDCP_BEACON_MS);
 }
 
-/* The beacon's deadline is also the end of the standby: long enough no other arbitrator was heard (D-BUS-12).
- */
+/* The beacon's deadline is also the end of the standby: no other arbitrator was heard for long enough
+ * (D-BUS-35). */
 static void on_beacon_deadline(pdcp_arb_t *arb)
 {
-    (void)is_young(arb);
-    forget_strangers(arb);
+    arb->bus.started_ms = arb->bus.now_ms - pdcp_bus_age_ms(&arb->bus); /* a longer difference would wrap */
+    pdcp_unknown_on_time(&arb->bus.unknown, arb->bus.now_ms);
     pdcp_bind_on_time(&arb->bus);
+    pdcp_standby_on_time(&arb->standby, arb->bus.now_ms);
     if (arb->silent) {
-        arb->silent = false;
-        arb->foreign = false;
-        forget_bus(arb);
-        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
+        take_over(arb);
     }
     send_beacon(arb);
+}
+
+/* A device is gone for good. It may still speak on its ids, where it cannot be heard now. */
+static void forget(pdcp_arb_t *arb, uint8_t node)
+{
+    const pdcp_node_t *device = node_of(arb, node);
+    pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, device->node_id);
+    for (uint8_t c = device->first_channel; c != PDCP_NONE; c = arb->bus.nodes.channels[c].next) {
+        pdcp_channel_t *channel = &arb->bus.nodes.channels[c];
+        if (channel->transfer == PDCP_OUTPUT && channel->node_id != 0) {
+            pdcp_bind_take_output_id(&arb->bus, channel);
+        }
+    }
+    pdcp_nodes_remove(&arb->bus.nodes, node);
+}
+
+/* Was an identity that is not known granted an id, and is not there (D-BUS-43)? Only its bind request was
+ * ever heard. */
+static bool is_ghost(const pdcp_arb_t *arb, const pdcp_node_t *device, uint32_t unheard_ms)
+{
+    return device->state == PDCP_NODE_SETUP && device->setup_pass == 0 && device->setup_step == 0 &&
+           !device->beaconed && !device->asked_again && unheard_ms >= PDCP_GHOST_MS &&
+           !pdcp_bind_is_known(&arb->bus, &device->identity);
 }
 
 static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     const uint32_t unheard_ms = arb->bus.now_ms - device->heard_ms;
-    if (device->state == PDCP_NODE_LOST) {
-        pdcp_nodes_remove(&arb->bus.nodes, node);
+    if (device->state == PDCP_NODE_ASKED) {
+        on_held(arb, node);
+    } else if (device->state == PDCP_NODE_LOST) {
+        forget(arb, node);
+    } else if (is_ghost(arb, device, unheard_ms)) {
+        pdcp_request_cancel(&arb->bus, node);
+        forget(arb, node);
     } else if (unheard_ms < silence_ms(device)) {
         set_life(arb, node, (uint16_t)(silence_ms(device) - unheard_ms));
     } else {
@@ -588,22 +858,17 @@ static void on_request_deadline(pdcp_arb_t *arb, uint8_t node)
     serve(arb, node);
 }
 
-/* Without a bus what waits is stale when there is one again; requests repeat themselves, and an answer to
- * what has been given up long ago would be taken for that to a newer one. */
-static void discard_queue(pdcp_arb_t *arb)
-{
-    arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
-    pdcp_txq_init(&arb->bus.txq);
-}
-
 static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 {
     if (timer == PDCP_TIMER_BEACON) {
         on_beacon_deadline(arb);
     } else if (timer == PDCP_TIMER_LINK) {
+        pdcp_link_open(&arb->bus);
         pdcp_link_on_ready(&arb->bus, PDCP_NONE);
     } else if (timer == PDCP_TIMER_HOST) {
         on_host_deadline(arb);
+    } else if (timer == PDCP_TIMER_STANDBY) {
+        on_standby_deadline(arb);
     } else if (timer == PDCP_TIMER_RECOVERY) {
         discard_queue(arb);
         arb->restart = true;
@@ -614,10 +879,20 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
     }
 }
 
+/* Was it not called, or off the bus, for so long that others may have taken it for gone? */
+static bool is_hung(const pdcp_arb_t *arb)
+{
+    return !arb->silent && !arb->listening && arb->recovery.state < (uint8_t)PDCP_BUS_OFF &&
+           arb->bus.now_ms - arb->beacon_ms > PDCP_HUNG_MS;
+}
+
 uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
 {
     uint8_t timer;
     arb->bus.now_ms = now_ms;
+    if (is_hung(arb)) {
+        listen(arb);
+    }
     while (pdcp_timers_take_due(&arb->bus.timers, now_ms, &timer)) {
         on_deadline(arb, timer);
     }
@@ -631,11 +906,14 @@ uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
 
 const can_frame_t *pdcp_arb_tx_peek(const pdcp_arb_t *arb)
 {
-    return pdcp_txq_peek(&arb->bus.txq);
+    return arb->listening ? NULL : pdcp_txq_peek(&arb->bus.txq);
 }
 
 void pdcp_arb_tx_pop(pdcp_arb_t *arb)
 {
+    if (is_beacon(pdcp_txq_peek(&arb->bus.txq))) {
+        arb->beacon_ms = arb->bus.now_ms;
+    }
     pdcp_txq_pop(&arb->bus.txq);
     count(arb, PDCP_STAT_TX);
 }
@@ -647,7 +925,7 @@ static bool is_bound(pdcp_arb_t *arb, uint8_t node)
         return false;
     }
     const uint8_t state = node_of(arb, node)->state;
-    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST;
+    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST && state != PDCP_NODE_ASKED;
 }
 
 static pdcp_status_t host_request(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param,
@@ -770,7 +1048,7 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb)
     return restart;
 }
 
-pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+static pdcp_status_t connect(pdcp_arb_t *arb, uint8_t output, uint8_t input, bool sole)
 {
     const pdcp_channel_t *channels = arb->bus.nodes.channels;
     if (output >= PDCP_CHANNELS_MAX || input >= PDCP_CHANNELS_MAX ||
@@ -780,7 +1058,20 @@ pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
     if (channels[output].node == channels[input].node) {
         return PDCP_ERR_OWN;
     }
-    return pdcp_link_wish(&arb->bus, output, input);
+    if (sole && pdcp_nodes_rival(&arb->bus.nodes, output, input) != PDCP_NONE) {
+        return PDCP_ERR_SOLE;
+    }
+    return pdcp_link_wish(&arb->bus, output, input, sole);
+}
+
+pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+{
+    return connect(arb, output, input, false);
+}
+
+pdcp_status_t pdcp_arb_connect_sole(pdcp_arb_t *arb, uint8_t output, uint8_t input)
+{
+    return connect(arb, output, input, true);
 }
 
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)

@@ -15,6 +15,7 @@
 #include "can_frame.h"
 #include "pdcp_bus.h"
 #include "pdcp_recovery.h"
+#include "pdcp_standby.h"
 
 /* The host's request to a device; one at a time. */
 typedef struct {
@@ -31,32 +32,30 @@ typedef struct {
     uint16_t len;   /* got so far */
 } pdcp_host_request_t;
 
-/* An id that is not bound and was told to reset (D-BUS-15). */
 typedef struct {
-    uint8_t node_id;
-    uint32_t until_ms;
-} pdcp_stranger_t;
-
-#define PDCP_STRANGERS_MAX 8
-
-typedef struct {
-    uint32_t asked_ms;   /* when a device asked to bind last, or the start */
-    uint32_t started_ms; /* means something while young */
-    uint32_t foreign_ms; /* when another arbitrator was heard last */
-    bool young;          /* in its first PDCP_YOUNG_MS */
-    bool foreign;        /* another arbitrator has been heard within the last PDCP_STANDBY_MS */
-    bool silent;         /* on standby (D-BUS-12) */
-    bool restart;        /* the controller is to be restarted */
+    uint32_t asked_ms;  /* when a device asked to bind last, or the start */
+    uint32_t beacon_ms; /* when its last beacon left */
+    uint32_t serial;
+    uint16_t
+        held_ms; /* the first grants were held for so long: taken off the start-up's quiet time (D-BUS-34) */
+    bool silent; /* on standby (D-BUS-42) */
+    bool listening; /* its beacons did not leave for too long: it sends nothing for a while (D-BUS-42) */
+    bool restart;   /* the controller is to be restarted */
     pdcp_host_request_t host;
     pdcp_bus_t bus;
     pdcp_recovery_t recovery;
-    uint16_t spread_ms; /* of the standby, from the serial number */
-    pdcp_stranger_t strangers[PDCP_STRANGERS_MAX];
+    pdcp_standby_t standby;
 } pdcp_arb_t;
 
-/* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads their return from standby (D-BUS-12).
- * The first beacon is due at once. */
-void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, pdcp_event_fn on_event, void *ctx);
+/* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads the times of D-BUS-42.
+ * seed should differ from start to start: it decides where the ids of outputs begin (D-BUS-36). The first
+ * beacon is due at once. */
+void pdcp_arb_init(pdcp_arb_t *arb, uint32_t now_ms, uint32_t serial, uint32_t seed, pdcp_event_fn on_event,
+                   void *ctx);
+
+/* Who is known from a stored limb keeps its place when strangers crowd in (D-BUS-43). knows gets the ctx of
+ * on_event. */
+void pdcp_arb_know(pdcp_arb_t *arb, pdcp_knows_fn knows);
 
 /* A frame from the bus, of any kind. Frames that this arbitrator has sent itself must not be handed in. True:
  * it may have led to something, pdcp_arb_step is to be called. False: nothing is due earlier than before; so
@@ -83,6 +82,11 @@ pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8
  * once. PDCP_ERR_UNKNOWN: wrong direction; PDCP_ERR_OWN: same device; PDCP_ERR_BUSY: another one is under
  * way. */
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input);
+
+/* The same with respect for sole access, for a host: PDCP_ERR_SOLE while pdcp_nodes_rival names an input that
+ * is in the way. The event has that status if there is one when the link has its turn. (A plan keeps sole
+ * access as a whole; until it is carried out, an output may have its new input beside the old one.) */
+pdcp_status_t pdcp_arb_connect_sole(pdcp_arb_t *arb, uint8_t output, uint8_t input);
 
 /* Takes the link of an input away (pdcp-bus.md 8); PDCP_EVENT_LINK tells when that is done. False: it has
  * none. */

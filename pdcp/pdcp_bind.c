@@ -1,5 +1,6 @@
 #include "pdcp_bind.h"
 
+#include <stddef.h>
 #include <string.h>
 
 #include "pdcp_bus.h"
@@ -8,6 +9,11 @@
 static bool is_node_id(uint8_t id)
 {
     return id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX;
+}
+
+void pdcp_bind_init(pdcp_bind_t *bind, uint32_t seed)
+{
+    bind->output_id = (uint8_t)(PDCP_NODE_MIN + seed % PDCP_NODE_MAX);
 }
 
 /* 0: it is not remembered. */
@@ -115,22 +121,53 @@ static bool is_free(const pdcp_bus_t *bus, uint8_t id)
     return true;
 }
 
-/* The first free id from this one on that nobody is remembered with; while there is none, that of the
- * identity that was away longest. step: 1 or -1. 0: none is left. */
+/* May nobody still speak on the id, or listen to it (D-BUS-36)? */
+static bool is_quiet(const pdcp_bus_t *bus, uint8_t id)
+{
+    return pdcp_unknown_silence(&bus->unknown, id) == PDCP_UNKNOWN_QUIET &&
+           !pdcp_nodes_may_hear(&bus->nodes, id);
+}
+
+static uint8_t next_id(uint8_t id, int8_t step)
+{
+    id = (uint8_t)(id + step);
+    if (!is_node_id(id)) {
+        return step > 0 ? PDCP_NODE_MIN : PDCP_NODE_MAX;
+    }
+    return id;
+}
+
+/* The free id that was unheard longest. 0: none is left. */
+static uint8_t unheard_id(const pdcp_bus_t *bus)
+{
+    uint8_t best = 0;
+    for (uint8_t id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
+        if (is_free(bus, id) && (best == 0 || pdcp_unknown_silence(&bus->unknown, id) >
+                                                  pdcp_unknown_silence(&bus->unknown, best))) {
+            best = id;
+        }
+    }
+    return best;
+}
+
+/* The first free and quiet id from this one on that nobody is remembered with; while there is none, that of
+ * the identity that was away longest; else the one that was unheard longest. step: 1 or -1. 0: none is left.
+ */
 static uint8_t pick_id(const pdcp_bus_t *bus, uint8_t id, int8_t step)
 {
-    for (; is_node_id(id); id = (uint8_t)(id + step)) {
-        if (is_free(bus, id) && !is_remembered(&bus->bind, id)) {
+    for (uint8_t left = PDCP_NODE_MAX; left > 0; left--) {
+        if (is_free(bus, id) && !is_remembered(&bus->bind, id) && is_quiet(bus, id)) {
             return id;
         }
+        id = next_id(id, step);
     }
     for (uint8_t i = bus->bind.remembered_count; i-- > 0;) {
         id = bus->bind.remembered[i].node_id;
-        if (is_free(bus, id)) {
+        if (is_free(bus, id) && is_quiet(bus, id)) {
             return id;
         }
     }
-    return 0;
+    return unheard_id(bus);
 }
 
 /* The id that this identity is to have: its old one, the one it asks for, the one reserved for it, which is
@@ -142,7 +179,7 @@ static uint8_t choose_id(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8
     if (is_free(bus, old)) {
         return old;
     }
-    if (is_free(bus, asked) && !is_remembered(&bus->bind, asked)) {
+    if (is_free(bus, asked) && !is_remembered(&bus->bind, asked) && is_quiet(bus, asked)) {
         return asked;
     }
     return is_free(bus, reserved) ? reserved : pick_id(bus, PDCP_NODE_MIN, 1);
@@ -168,12 +205,39 @@ static pdcp_bind_result_t offer(pdcp_bus_t *bus, const pdcp_identity_t *identity
         return PDCP_BIND_SUGGESTED;
     }
     answer(bus, identity, asked, id, PDCP_STAT_BIND_GRANTED);
-    const uint8_t old = remembered_id(&bus->bind, identity);
-    remember(&bus->bind, identity, id);
-    if (old != id) { /* order alone is not worth a write to non-volatile memory */
-        pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
+    if (remembered_id(&bus->bind, identity) == id) {
+        remember(&bus->bind, identity, id); /* it is the one used last; order alone is not worth a write */
     }
     return PDCP_BIND_GRANTED;
+}
+
+void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_node_t *device)
+{
+    if (remembered_id(&bus->bind, &device->identity) != device->node_id) {
+        remember(&bus->bind, &device->identity, device->node_id);
+        pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
+    }
+}
+
+bool pdcp_bind_is_known(const pdcp_bus_t *bus, const pdcp_identity_t *identity)
+{
+    return remembered_id(&bus->bind, identity) != 0 ||
+           (bus->knows != NULL && bus->knows(bus->event_ctx, identity));
+}
+
+/* Have identities that are not known as many places as they may (D-BUS-43)? */
+static bool is_crowded(const pdcp_bus_t *bus)
+{
+    uint8_t places = 0;
+    if (pdcp_bus_age_ms(bus) < PDCP_CROWD_MS) {
+        return false;
+    }
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        const pdcp_node_t *node = &bus->nodes.nodes[i];
+        places =
+            (uint8_t)(places + (node->state != PDCP_NODE_FREE && !pdcp_bind_is_known(bus, &node->identity)));
+    }
+    return places >= PDCP_UNKNOWN_PLACES;
 }
 
 pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
@@ -190,7 +254,10 @@ pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *
         return PDCP_BIND_CHECK;
     }
     /* Without a place nothing is given back. With one, an id that is reserved is there to be had. */
-    const uint8_t place = pdcp_nodes_free_place(&bus->nodes);
+    uint8_t place = pdcp_nodes_free_place(&bus->nodes);
+    if (!pdcp_bind_is_known(bus, identity) && is_crowded(bus)) {
+        place = PDCP_NONE;
+    }
     const uint8_t id = place != PDCP_NONE ? choose_id(bus, identity, asked) : 0;
     if (id == 0) {
         answer(bus, identity, asked, PDCP_NODE_REFUSED, PDCP_STAT_BIND_REFUSED);
@@ -216,7 +283,29 @@ pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t node, bool ans
     return PDCP_BIND_REFUSED;
 }
 
+bool pdcp_bind_is_shut(const pdcp_bus_t *bus)
+{
+    return bus->bind.shut && pdcp_bus_age_ms(bus) < PDCP_SHUT_MS;
+}
+
 uint8_t pdcp_bind_output_id(const pdcp_bus_t *bus)
 {
-    return pick_id(bus, PDCP_NODE_MAX, -1);
+    return pdcp_bind_is_shut(bus) ? 0 : pick_id(bus, bus->bind.output_id, -1);
+}
+
+bool pdcp_bind_give_output_id(pdcp_bus_t *bus, pdcp_channel_t *output)
+{
+    const uint8_t id = pdcp_bind_output_id(bus);
+    if (id == 0) {
+        return false;
+    }
+    pdcp_nodes_set_output_id(&bus->nodes, output, id);
+    bus->bind.output_id = next_id(id, -1);
+    return true;
+}
+
+void pdcp_bind_take_output_id(pdcp_bus_t *bus, pdcp_channel_t *output)
+{
+    pdcp_unknown_note(&bus->unknown, bus->now_ms, output->node_id);
+    pdcp_nodes_set_output_id(&bus->nodes, output, 0);
 }

@@ -13,6 +13,8 @@
 #include "pdcp_spec.h"
 
 struct pdcp_bus;
+struct pdcp_channel;
+struct pdcp_node;
 
 typedef struct {
     pdcp_identity_t identity;
@@ -25,8 +27,9 @@ typedef struct {
     uint32_t until_ms;
 } pdcp_reserved_t;
 
-/* All 0: nothing is remembered, nothing reserved. */
 typedef struct {
+    uint8_t output_id; /* where the search for the next id of an output begins */
+    bool shut;         /* somebody lives on from before the start: no ids for outputs until PDCP_SHUT_MS */
     uint8_t remembered_count;
     pdcp_remembered_t remembered[PDCP_IDENTITIES_MAX];
     pdcp_reserved_t reserved[PDCP_RESERVED_MAX];
@@ -41,10 +44,21 @@ typedef enum {
                             pdcp_bind_after_check */
 } pdcp_bind_result_t;
 
+/* bind is all 0 before: nothing is remembered, nothing reserved. Ids of outputs are drawn from a place that
+ * seed, which should differ from start to start, decides, and that moves on (D-BUS-36). */
+void pdcp_bind_init(pdcp_bind_t *bind, uint32_t seed);
+
 /* Adds an identity behind those that are there, as they come from non-volatile memory, most recently used
  * first. Entries with an invalid or already remembered id, a repeated identity, or beyond the room are left
  * out: false. */
 bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry);
+
+/* Is the identity remembered, or part of a stored limb? Others are kept out when places become few
+ * (D-BUS-43). */
+bool pdcp_bind_is_known(const struct pdcp_bus *bus, const pdcp_identity_t *identity);
+
+/* A device is set up: it is remembered with its id (D-BUS-43). */
+void pdcp_bind_on_ready(struct pdcp_bus *bus, const struct pdcp_node *device);
 
 /* Frees reservations that are over; to be called every few days at least. */
 void pdcp_bind_on_time(struct pdcp_bus *bus);
@@ -58,9 +72,19 @@ pdcp_bind_result_t pdcp_bind_on_request(struct pdcp_bus *bus, const pdcp_identit
  * pdcp_bind_on_request left open. */
 pdcp_bind_result_t pdcp_bind_after_check(struct pdcp_bus *bus, uint8_t node, bool answered);
 
-/* A node id for an output channel: free, not reserved, and while there is one, not remembered for a device,
- * else that of the device that was away longest. Highest first, since devices tend to ask for low ones. 0:
- * none is left. */
+/* Is no output given an id at this time, because somebody may still speak on any or listen to it (D-BUS-36)?
+ */
+bool pdcp_bind_is_shut(const struct pdcp_bus *bus);
+
+/* The node id that an output without one is to have: one that nobody owns, speaks on or listens to, and while
+ * there is one, that is not remembered for a device, else that of the device that was away longest; if all
+ * are in use, the one that was unheard longest (D-BUS-36). A freed id comes last. 0: none is left. */
 uint8_t pdcp_bind_output_id(const struct pdcp_bus *bus);
+
+/* Gives an output without an id that one. False: none is left, or the time has not come. */
+bool pdcp_bind_give_output_id(struct pdcp_bus *bus, struct pdcp_channel *output);
+
+/* Takes the id of an output away. Somebody may still speak on it. */
+void pdcp_bind_take_output_id(struct pdcp_bus *bus, struct pdcp_channel *output);
 
 #endif

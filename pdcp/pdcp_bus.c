@@ -5,6 +5,12 @@ pdcp_node_t *pdcp_bus_node(pdcp_bus_t *bus, uint8_t node)
     return &bus->nodes.nodes[node];
 }
 
+uint32_t pdcp_bus_age_ms(const pdcp_bus_t *bus)
+{
+    const uint32_t age_ms = bus->now_ms - bus->started_ms;
+    return age_ms < PDCP_AGE_MAX_MS ? age_ms : PDCP_AGE_MAX_MS;
+}
+
 void pdcp_bus_wake(pdcp_bus_t *bus, uint8_t timer, uint16_t in_ms)
 {
     pdcp_timers_set(&bus->timers, timer, bus->now_ms + in_ms);

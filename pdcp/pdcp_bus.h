@@ -11,6 +11,7 @@
 #include "pdcp_stats.h"
 #include "pdcp_timer.h"
 #include "pdcp_txq.h"
+#include "pdcp_unknown.h"
 
 typedef enum {
     PDCP_EVENT_BOUND,        /* node: first beacon of a device, it counts from now on */
@@ -42,11 +43,17 @@ typedef struct {
  * the arbitrator but to read its tables; the event is valid during the call. */
 typedef void (*pdcp_event_fn)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
 
+/* Is this identity part of a limb that is stored? Same context as pdcp_event_fn; NULL stands for: of none. */
+typedef bool (*pdcp_knows_fn)(void *ctx, const pdcp_identity_t *identity);
+
 /* Small state stands first here and in the structs around it: on the smallest part, a field that lies farther
  * than 511 bytes from the beginning costs twice the instructions. */
 typedef struct pdcp_bus {
-    uint32_t now_ms; /* of the call that the arbitrator is in: its functions note it first of all */
+    uint32_t now_ms;      /* of the call that the arbitrator is in: its functions note it first of all */
+    uint32_t started_ms;  /* slides along behind: see pdcp_bus_age_ms */
+    uint32_t silenced_ms; /* when an output answered last that it is not enabled any more */
     pdcp_event_fn on_event;
+    pdcp_knows_fn knows;
     void *event_ctx;
     pdcp_link_t link;
     pdcp_nodes_t nodes;
@@ -54,10 +61,14 @@ typedef struct pdcp_bus {
     pdcp_txq_t txq;
     uint32_t stats[PDCP_STAT_COUNT];
     pdcp_bind_t bind;
+    pdcp_unknown_t unknown;
 } pdcp_bus_t;
 
 /* The device at this place, which must be one. */
 pdcp_node_t *pdcp_bus_node(pdcp_bus_t *bus, uint8_t node);
+
+/* Time since the start, PDCP_AGE_MAX_MS at most. */
+uint32_t pdcp_bus_age_ms(const pdcp_bus_t *bus);
 
 /* Sets timer so that it fires in_ms from now. */
 void pdcp_bus_wake(pdcp_bus_t *bus, uint8_t timer, uint16_t in_ms);

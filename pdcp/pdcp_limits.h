@@ -9,6 +9,9 @@
 #define PDCP_DEVICES_MAX 32 /* bound at a time; 1 to 64 (the reset bitmap of the host API has 64 bits) */
 #endif
 
+/* Places that identities which are not known may take; the others are kept for known ones (D-BUS-43). */
+#define PDCP_UNKNOWN_PLACES (PDCP_DEVICES_MAX - PDCP_DEVICES_MAX / 4)
+
 #ifndef PDCP_CHANNELS_MAX
 #define PDCP_CHANNELS_MAX 128 /* of all devices together; 1 to 254 */
 #endif
@@ -35,6 +38,6 @@
 #define PDCP_PARAMETER_MAX 512
 
 /* RAM budget of the whole application, on a target with 16-bit int and pointers. */
-#define ARB_RAM_BUDGET 11264
+#define ARB_RAM_BUDGET 12032
 
 #endif

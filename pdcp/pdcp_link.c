@@ -9,6 +9,7 @@
 typedef enum {
     STEP_READ_VID_PID, /* Update Data Channel: what source the device names */
     STEP_READ_SERIAL,
+    STEP_OUTPUT_ID, /* if the output has none */
     STEP_INPUT_OFF, /* before its source is replaced */
     STEP_VID_PID,
     STEP_SERIAL,
@@ -19,11 +20,15 @@ typedef enum {
     STEP_END
 } step_t;
 
+/* What only silences a channel. */
+#define SILENCES ((unsigned)PDCP_TODO_SILENCE | (unsigned)PDCP_TODO_AGAIN)
+
 void pdcp_link_init(pdcp_bus_t *bus)
 {
     const bool planned = bus->link.planned;
     memset(&bus->link, 0, sizeof bus->link);
     bus->link.planned = planned;
+    bus->link.closed = true;
     bus->link.wish_input = PDCP_NONE;
     bus->link.at = PDCP_NONE;
 }
@@ -50,13 +55,24 @@ static bool is_unconnected(const pdcp_channel_t *input)
     return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
 }
 
-/* A link that is to be taken away is, whatever comes after: that silences its input, too, and leaves nothing
- * to be made. */
+/* What is no longer to be done, because it was done or something else does it, too. */
+static void drop_todo(pdcp_channel_t *channel, unsigned todo)
+{
+    channel->todo = (uint8_t)(channel->todo & ~todo);
+}
+
+/* Notes what is to be done. A silence that is needed is never forgotten: what was noted before stays, until
+ * its own job begins or a job that silences the input, too, whatever comes of it. Making a link begins with
+ * the input off, and silences it again when it fails or cannot start. Taking one away silences the input, and
+ * leaves nothing to be made. */
 static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (channel->todo != PDCP_TODO_REMOVE) {
-        channel->todo = (uint8_t)todo;
+    channel->todo = (uint8_t)(channel->todo | (unsigned)todo);
+    if ((channel->todo & PDCP_TODO_REMOVE) != 0) {
+        channel->todo = PDCP_TODO_REMOVE;
+    } else if ((channel->todo & PDCP_TODO_CONNECT) != 0) {
+        drop_todo(channel, SILENCES);
     }
     bus->link.due = true;
 }
@@ -92,13 +108,14 @@ static void release_output(pdcp_bus_t *bus, uint8_t output)
     }
 }
 
-pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input)
+pdcp_status_t pdcp_link_wish(pdcp_bus_t *bus, uint8_t output, uint8_t input, bool sole)
 {
     if (bus->link.wish_input != PDCP_NONE) {
         return PDCP_ERR_BUSY;
     }
     bus->link.wish_input = input;
     bus->link.wish_output = output;
+    bus->link.wish_sole = sole;
     bus->link.due = true;
     return PDCP_OK;
 }
@@ -145,7 +162,7 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
         }
         input->feed = find_source(bus, input);
         const uint8_t source = owner_of(bus, input->feed);
-        if (source == PDCP_NONE || input->todo == PDCP_TODO_UPDATE) {
+        if (source == PDCP_NONE || (input->todo & PDCP_TODO_UPDATE) != 0) {
             continue;
         }
         if (node == PDCP_NONE || input->node == node || source == node) {
@@ -160,6 +177,7 @@ void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[input];
     channel->link = PDCP_LINK_INACTIVE;
+    drop_todo(channel, PDCP_TODO_CONNECT);
     put_todo(bus, input, PDCP_TODO_SILENCE);
     release_output(bus, channel->feed);
     pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, PDCP_OK);
@@ -222,10 +240,15 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
     }
 }
 
+static bool is_about_output(const pdcp_bus_t *bus)
+{
+    return bus->link.step == STEP_OUTPUT_ON || bus->link.step == STEP_OUTPUT_ID;
+}
+
 /* The channel that the current step is about. */
 static uint8_t target_of(const pdcp_bus_t *bus)
 {
-    return bus->link.step == STEP_OUTPUT_ON ? bus->link.output : bus->link.input;
+    return is_about_output(bus) ? bus->link.output : bus->link.input;
 }
 
 static void take_old(pdcp_bus_t *bus, const pdcp_channel_t *input)
@@ -274,7 +297,7 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
         bus->link.undoing = false;
     }
     if (kind == PDCP_TODO_CONNECT) {
-        bus->link.step = STEP_INPUT_OFF;
+        bus->link.step = STEP_OUTPUT_ID;
         name_source(bus, channel);
     }
 }
@@ -294,7 +317,7 @@ static void tell_outcome(pdcp_bus_t *bus)
 static void silence_again(pdcp_bus_t *bus, uint8_t number)
 {
     const pdcp_channel_t *channel = channel_of(bus, number);
-    if (channel != NULL && channel->enabled && channel->todo == PDCP_TODO_NONE) {
+    if (channel != NULL && channel->enabled) {
         put_todo(bus, number, PDCP_TODO_AGAIN);
     }
 }
@@ -328,7 +351,8 @@ static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
 static void settle_made(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     input->link = PDCP_LINK_ACTIVE;
-    release_output(bus, bus->link.old_feed); /* unless it is the same: that one is needed */
+    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* noted while it was being made */
+    release_output(bus, bus->link.old_feed);        /* unless it is the same: that one is needed */
 }
 
 static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -420,16 +444,28 @@ static void advance(pdcp_bus_t *bus)
     }
 }
 
+static bool has_id(const pdcp_bus_t *bus, uint8_t output)
+{
+    return output != PDCP_NONE && bus->nodes.channels[output].node_id != 0;
+}
+
+/* Is the output there that the current step needs, with a node id or, in the step that gives it one, one to
+ * be had? */
+static bool has_output(pdcp_bus_t *bus)
+{
+    const uint8_t output = bus->link.output;
+    const bool is_giving = bus->link.step == STEP_OUTPUT_ID;
+    return is_ready(bus, output) && (has_id(bus, output) || (is_giving && pdcp_bind_output_id(bus) != 0));
+}
+
 /* Can the current step be carried out? Making a link needs its input in every step. */
 static bool step_possible(pdcp_bus_t *bus)
 {
-    if (bus->link.step == STEP_OUTPUT_ON || (bus->link.step == STEP_NODES && !bus->link.undoing)) {
-        if (!is_ready(bus, bus->link.output)) {
-            return false;
-        }
-        if (bus->link.undoing) {
-            return true;
-        }
+    if (bus->link.undoing) {
+        return is_ready(bus, target_of(bus));
+    }
+    if ((is_about_output(bus) || bus->link.step == STEP_NODES) && !has_output(bus)) {
+        return false;
     }
     return is_ready(bus, bus->link.input);
 }
@@ -470,6 +506,11 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
                              (uint16_t)((uint16_t)output->node_id << 8));
         }
         break;
+    case STEP_OUTPUT_ID:
+        *param = PDCP_OUT_NODE_ID;
+        low = output->node_id;
+        len = 1;
+        break;
     case STEP_INPUT_OFF:
         *param = PDCP_CH_ENABLED;
         len = input->enabled ? 1 : 0;
@@ -491,6 +532,9 @@ static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
 {
     uint8_t param;
     uint8_t bytes[PDCP_VALUE_MAX];
+    if (bus->link.step == STEP_OUTPUT_ID && !pdcp_bind_give_output_id(bus, channel)) {
+        return false;
+    }
     const uint8_t len = value_of(bus, &param, bytes);
     if (bus->link.step <= STEP_READ_SERIAL) {
         pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, PDCP_VALUE_MAX);
@@ -502,11 +546,20 @@ static bool send_step(pdcp_bus_t *bus, pdcp_channel_t *channel)
     if (param == PDCP_CH_ENABLED && bytes[0] != 0) {
         channel->enabled = true; /* from now on it may be */
     }
+    if (bus->link.step == STEP_NODES && !bus->link.undoing) {
+        channel->node_id = bytes[1]; /* from now on it may listen to it */
+    }
     pdcp_request_set(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
     if (bus->link.once) {
-        pdcp_request_try_once(bus, channel->node);
+        pdcp_request_limit_tries(bus, channel->node, 1);
     }
     return true;
+}
+
+/* An output is not enabled in the arbitrator's first time (D-BUS-36). */
+static bool is_too_early(const pdcp_bus_t *bus)
+{
+    return bus->link.closed && bus->link.step == STEP_OUTPUT_ON && !bus->link.undoing;
 }
 
 /* Carries the job on until it waits for an answer, waits for a device's place, or is over. */
@@ -520,7 +573,9 @@ static void run(pdcp_bus_t *bus)
             } else {
                 give_up(bus, PDCP_ERR_NO_ANSWER);
             }
-        } else if (!pdcp_request_is_idle(bus, channel->node)) {
+        } else if (bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output)) {
+            advance(bus);
+        } else if (!pdcp_request_is_idle(bus, channel->node) || is_too_early(bus)) {
             return;
         } else if (send_step(bus, channel)) {
             bus->link.at = channel->node;
@@ -530,15 +585,30 @@ static void run(pdcp_bus_t *bus)
     }
 }
 
+void pdcp_link_is_disabled(pdcp_bus_t *bus, pdcp_channel_t *channel)
+{
+    channel->enabled = false;
+    if (channel->transfer == PDCP_INPUT) {
+        channel->node_id = 0;
+    } else {
+        bus->silenced_ms = bus->now_ms;
+    }
+}
+
+void pdcp_link_open(pdcp_bus_t *bus)
+{
+    bus->link.closed = false;
+}
+
 static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     pdcp_channel_t *channel = channel_of(bus, target_of(bus));
     if (bus->link.step <= STEP_READ_SERIAL) {
         pdcp_nodes_take_source(channel, reply);
-    } else if (bus->link.step == STEP_INPUT_OFF) {
-        channel->enabled = false;
-    } else if (bus->link.step >= STEP_INPUT_ON) {
-        channel->enabled = !bus->link.undoing;
+    } else if (bus->link.step == STEP_INPUT_OFF || (bus->link.step >= STEP_INPUT_ON && bus->link.undoing)) {
+        pdcp_link_is_disabled(bus, channel);
+    } else if (bus->link.step == STEP_NODES && bus->link.undoing) {
+        channel->node_id = 0;
     }
 }
 
@@ -546,6 +616,10 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 static void on_failure(pdcp_bus_t *bus, pdcp_status_t status)
 {
     const bool silent = status == PDCP_ERR_NO_ANSWER;
+    if (bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output)) {
+        pdcp_bind_take_output_id(
+            bus, channel_of(bus, bus->link.output)); /* it may have it, and gets another one */
+    }
     if (!bus->link.undoing) {
         if (bus->link.step == STEP_TYPE && status == PDCP_ERR_REFUSED) {
             advance(bus); /* a device without the profile layer (D-BUS-20) */
@@ -608,14 +682,13 @@ void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     run(bus);
 }
 
-/* Starts the job that a channel has to do, if it can be done now. */
-static void start_todo(pdcp_bus_t *bus, uint8_t number)
+/* Starts a job that a channel has to do, if it can be done now. */
+static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
-    const pdcp_todo_t todo = (pdcp_todo_t)channel->todo;
     uint8_t input = number;
     uint8_t output = PDCP_NONE;
-    channel->todo = PDCP_TODO_NONE;
+    drop_todo(channel, todo == PDCP_TODO_SILENCE ? SILENCES : (unsigned)todo);
     if (todo == PDCP_TODO_CONNECT) {
         output = find_source(bus, channel);
         channel->feed = output;
@@ -652,7 +725,12 @@ static void start_wish(pdcp_bus_t *bus)
         pdcp_link_forget_wish(bus, PDCP_OK);
         return;
     }
-    input->todo = PDCP_TODO_NONE;
+    if (bus->link.wish_sole &&
+        pdcp_nodes_rival(&bus->nodes, bus->link.wish_output, bus->link.wish_input) != PDCP_NONE) {
+        pdcp_link_forget_wish(bus, PDCP_ERR_SOLE); /* another link was made while this one waited */
+        return;
+    }
+    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* it begins with the input off */
     begin(bus, PDCP_TODO_CONNECT, bus->link.wish_input, bus->link.wish_output);
     bus->link.for_host = true;
     bus->link.wish_input = PDCP_NONE;
@@ -660,18 +738,19 @@ static void start_wish(pdcp_bus_t *bus)
 
 /* What is to be done next, PDCP_TODO_NONE: nothing, and for which channel: what silences comes before what
  * connects. */
-static uint8_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
+static pdcp_todo_t next_todo(const pdcp_bus_t *bus, uint8_t *number)
 {
-    uint8_t best = PDCP_TODO_NONE;
+    unsigned best = PDCP_TODO_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *channel = &bus->nodes.channels[i];
-        if (channel->todo != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || channel->todo < best) &&
+        const unsigned lowest = channel->todo & (0u - channel->todo);
+        if (lowest != PDCP_TODO_NONE && (best == PDCP_TODO_NONE || lowest < best) &&
             bus->nodes.nodes[channel->node].state != PDCP_NODE_SETUP) {
-            best = channel->todo;
+            best = lowest;
             *number = i;
         }
     }
-    return best;
+    return (pdcp_todo_t)best;
 }
 
 /* Is there something to be done, other than to silence again? */
@@ -681,7 +760,7 @@ static bool has_work(const pdcp_bus_t *bus)
     if (bus->link.wish_input != PDCP_NONE) {
         return true;
     }
-    const uint8_t todo = bus->link.due ? next_todo(bus, &number) : (uint8_t)PDCP_TODO_NONE;
+    const pdcp_todo_t todo = bus->link.due ? next_todo(bus, &number) : PDCP_TODO_NONE;
     return todo != PDCP_TODO_NONE && todo != PDCP_TODO_AGAIN;
 }
 
@@ -715,11 +794,11 @@ void pdcp_link_step(pdcp_bus_t *bus)
     run(bus);
     while (!bus->link.active && bus->link.due) {
         uint8_t number = PDCP_NONE;
-        const uint8_t todo = next_todo(bus, &number);
+        const pdcp_todo_t todo = next_todo(bus, &number);
         if (bus->link.wish_input != PDCP_NONE && todo != PDCP_TODO_SILENCE && todo != PDCP_TODO_REMOVE) {
             start_wish(bus);
         } else if (todo != PDCP_TODO_NONE) {
-            start_todo(bus, number);
+            start_todo(bus, number, todo);
         } else {
             bus->link.due = false;
         }

@@ -14,11 +14,13 @@
 #include "pdcp_spec.h"
 
 struct pdcp_bus;
+struct pdcp_channel;
 
 typedef struct {
     bool planned;   /* the profile layer decides which links are made: none comes by itself */
     bool stored;    /* and from a stored configuration: Update Data Channel changes nothing */
     bool due;       /* some channel has something to do */
+    bool closed;    /* the arbitrator has just started: no output is enabled (D-BUS-36) */
     bool active;    /* a job is under way */
     bool undoing;   /* steps run backwards */
     bool once;      /* the device that failed is tried once only */
@@ -31,9 +33,10 @@ typedef struct {
     uint8_t output; /* channel number; PDCP_NONE: gone, or the job has none */
     bool output_was_on; /* before the job */
     int8_t status;      /* outcome so far, pdcp_status_t */
-    /* The link that the host has asked for; wish_input PDCP_NONE: none. */
+    /* The link that the host or the planner has asked for; wish_input PDCP_NONE: none. */
     uint8_t wish_input;
     uint8_t wish_output;
+    bool wish_sole; /* not if another input keeps it from the output */
     /* The input's source before the job, to be restored when it fails. */
     uint8_t old_index;
     uint8_t old_link;
@@ -53,8 +56,8 @@ bool pdcp_link_is_settled(const struct pdcp_bus *bus);
 void pdcp_link_rest(struct pdcp_bus *bus, uint8_t input);
 
 /* Asks for exactly this link. PDCP_OK: the outcome comes as PDCP_EVENT_WISH. PDCP_ERR_BUSY: another wish is
- * under way. */
-pdcp_status_t pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input);
+ * under way. sole: if sole access forbids it when its turn comes, it ends with PDCP_ERR_SOLE. */
+pdcp_status_t pdcp_link_wish(struct pdcp_bus *bus, uint8_t output, uint8_t input, bool sole);
 
 /* A wish that has not been started ends with status. Nothing happens when there is none. */
 void pdcp_link_forget_wish(struct pdcp_bus *bus, pdcp_status_t status);
@@ -82,6 +85,12 @@ void pdcp_link_on_lost(struct pdcp_bus *bus, uint8_t node);
 
 /* A reply to a request of PDCP_CLIENT_LINK. */
 void pdcp_link_on_reply(struct pdcp_bus *bus, const pdcp_reply_t *reply);
+
+/* A channel has answered that its transfer is not enabled any more. */
+void pdcp_link_is_disabled(struct pdcp_bus *bus, struct pdcp_channel *channel);
+
+/* The first time after the start is over: outputs may be enabled. */
+void pdcp_link_open(struct pdcp_bus *bus);
 
 /* Starts what can be started. Costs nothing when there is nothing to do. */
 void pdcp_link_step(struct pdcp_bus *bus);

@@ -53,6 +53,12 @@ void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *i
     nodes->owner[node_id] = (uint8_t)(place + 1);
 }
 
+void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity)
+{
+    nodes->nodes[place].state = PDCP_NODE_ASKED;
+    nodes->nodes[place].identity = *identity;
+}
+
 static void drop_needs(pdcp_nodes_t *nodes, pdcp_node_t *gone)
 {
     const uint16_t size = (uint16_t)(2u * gone->needs_stride * gone->channel_count);
@@ -102,7 +108,9 @@ static void cut_channels(pdcp_nodes_t *nodes, pdcp_node_t *owner, uint8_t count)
             link = &channel->next;
         } else {
             *link = channel->next;
-            pdcp_nodes_set_output_id(nodes, channel, 0);
+            if (channel->transfer == PDCP_OUTPUT) {
+                pdcp_nodes_set_output_id(nodes, channel, 0);
+            }
             memset(channel, 0, sizeof *channel);
             channel->node = PDCP_NONE;
             pdcp_nodes_drop_feed(nodes, number);
@@ -196,6 +204,26 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
     return channel;
 }
 
+bool pdcp_nodes_may_hear(const pdcp_nodes_t *nodes, uint8_t node_id)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (nodes->channels[i].node_id == node_id && nodes->channels[i].transfer == PDCP_INPUT) {
+            return true;
+        }
+    }
+    return false;
+}
+
+uint8_t pdcp_nodes_output(const pdcp_nodes_t *nodes, uint8_t node, uint8_t node_id)
+{
+    uint8_t channel = nodes->nodes[node].first_channel;
+    while (channel != PDCP_NONE && (nodes->channels[channel].node_id != node_id ||
+                                    nodes->channels[channel].transfer != PDCP_OUTPUT)) {
+        channel = nodes->channels[channel].next;
+    }
+    return channel;
+}
+
 bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node)
 {
     pdcp_node_t *owner = &nodes->nodes[node];
@@ -264,6 +292,31 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
         }
     }
     return false;
+}
+
+/* Status of the link that an input has to an output; PDCP_LINK_NONE: it has none, or not to this one. */
+static uint8_t link_to(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, uint8_t output)
+{
+    const pdcp_channel_t *source = &nodes->channels[output];
+    if (input->source_index != source->index ||
+        !pdcp_identity_equal(&input->source, &nodes->nodes[source->node].identity)) {
+        return PDCP_LINK_NONE;
+    }
+    return input->link;
+}
+
+uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
+{
+    const pdcp_channel_t *asked = &nodes->channels[input];
+    const uint8_t own = link_to(nodes, asked, output);
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const pdcp_channel_t *other = &nodes->channels[i];
+        if (other != asked && (other->type & asked->type & PDCP_TYPE_SOLE) != 0 &&
+            link_to(nodes, other, output) > own) {
+            return i;
+        }
+    }
+    return PDCP_NONE;
 }
 
 /* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE:

@@ -20,10 +20,11 @@ typedef enum {
     PDCP_NODE_SETUP,  /* bound, being read and written */
     PDCP_NODE_READY,  /* set up: its channels count */
     PDCP_NODE_FAILED, /* bound, but its setup failed: no channels, no links */
-    PDCP_NODE_LOST    /* silent for too long: ids and links are kept for it */
+    PDCP_NODE_LOST,   /* silent for too long: ids and links are kept for it */
+    PDCP_NODE_ASKED   /* its bind request is held (D-BUS-42): neither node id nor channels yet */
 } pdcp_node_state_t;
 
-typedef struct {
+typedef struct pdcp_node {
     pdcp_identity_t identity;
     uint16_t type;
     uint16_t profile;
@@ -41,7 +42,7 @@ typedef struct {
     bool taken_back;       /* it beaconed while lost; who it is has not been read yet (D-BUS-15) */
     bool reset_asked;      /* Reset Device is to be sent, or is under way */
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
-    uint8_t asked_id;      /* with this id */
+    uint8_t asked_id;      /* with this id; also of a request that is held */
     bool setup_again;      /* it was left before: tried once more, silently (D-BUS-17) */
     uint8_t setup_pass;    /* pdcp_setup.c */
     uint8_t setup_step;
@@ -56,27 +57,28 @@ typedef enum {
     PDCP_LINK_ACTIVE = 2    /* its last write is answered */
 } pdcp_link_status_t;
 
-/* What still has to be written to a channel; carried out by pdcp_link.c, lowest first. */
+/* What still has to be written to a channel: a set of these bits. pdcp_link.c carries it out, the lowest bit
+ * first. */
 typedef enum {
     PDCP_TODO_NONE = 0,
-    PDCP_TODO_SILENCE, /* input: its source is lost, not enabled, no node ids (D-BUS-14); output: not enabled,
-                          nobody listens */
-    PDCP_TODO_REMOVE,  /* input: back to unconnected */
-    PDCP_TODO_CONNECT, /* input: make the link to the source that it has */
-    PDCP_TODO_UPDATE,  /* input: its device has sent Update Data Channel */
-    PDCP_TODO_AGAIN    /* silence it: the write before was not answered, and everybody else comes first */
+    PDCP_TODO_SILENCE = 1, /* input: its source is lost, not enabled, no node ids (D-BUS-14); output: not
+                              enabled, nobody listens */
+    PDCP_TODO_REMOVE = 2,  /* input: back to unconnected */
+    PDCP_TODO_CONNECT = 4, /* input: make the link to the source that it has */
+    PDCP_TODO_UPDATE = 8,  /* input: its device has sent Update Data Channel */
+    PDCP_TODO_AGAIN = 16   /* silence it: the write before was not answered, and everybody else comes first */
 } pdcp_todo_t;
 
-typedef struct {
+typedef struct pdcp_channel {
     uint16_t type;
     uint16_t profile;
     uint8_t node;     /* place of the owner; PDCP_NONE: this entry of the pool is free */
     uint8_t index;    /* channel index, 1 to n */
     uint8_t next;     /* the owner's next channel, PDCP_NONE: the last */
     uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
-    uint8_t node_id;  /* outputs: 0 = none yet */
+    uint8_t node_id;  /* outputs: their own; inputs: the output's that parameter 7 may name; 0 = none */
     bool enabled;     /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
-    uint8_t todo;     /* pdcp_todo_t */
+    uint8_t todo;     /* a set of pdcp_todo_t */
     /* Inputs only: */
     uint8_t link;         /* pdcp_link_status_t */
     uint8_t feed;         /* channel number of the source, PDCP_NONE: it is not on the bus */
@@ -106,6 +108,9 @@ uint8_t pdcp_nodes_free_place(const pdcp_nodes_t *nodes);
 
 /* Takes a free place for a device with this node id, which must be free. */
 void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id);
+
+/* Takes a free place for a device whose bind request is held. */
+void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity);
 
 /* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
  * nothing. */
@@ -139,6 +144,18 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
 
 /* No input is fed by this channel any more: it is gone, or no output now. */
 void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
+
+/* May an input still listen to this node id? It may until 0 was answered, in parameter 7 or to transfer
+ * enabled (D-BUS-36). */
+bool pdcp_nodes_may_hear(const pdcp_nodes_t *nodes, uint8_t node_id);
+
+/* Channel number of the output of a device that has this node id; PDCP_NONE: it has none. */
+uint8_t pdcp_nodes_output(const pdcp_nodes_t *nodes, uint8_t node, uint8_t node_id);
+
+/* The input that keeps this one, which must be another's, from the output, because both want it for
+ * themselves (D-API-13); PDCP_NONE: there is none. An inactive link counts, since it comes back, but less
+ * than one that works; so does that which the input itself has to this output. */
+uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
 
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
 void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id);

@@ -21,6 +21,7 @@ static uint8_t code_of(const pdcp_request_t *request)
         [PDCP_REQUEST_GET_SIZE] = PDCP_BULK_GET,
         [PDCP_REQUEST_SET_SIZE] = PDCP_BULK_SET,
         [PDCP_REQUEST_SET_DATA] = PDCP_BULK_DATA,
+        [PDCP_REQUEST_SET_ECHO] = PDCP_BULK_DATA,
     };
     return request->state == PDCP_REQUEST_ANSWER ? request->code : codes[request->state];
 }
@@ -119,9 +120,9 @@ void pdcp_request_start(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uin
     enter(bus, device, PDCP_REQUEST_ANSWER);
 }
 
-void pdcp_request_try_once(pdcp_bus_t *bus, uint8_t node)
+void pdcp_request_limit_tries(pdcp_bus_t *bus, uint8_t node, uint8_t tries)
 {
-    pdcp_bus_node(bus, node)->request.tries_left = 0;
+    pdcp_bus_node(bus, node)->request.tries_left = (uint8_t)(tries - 1u);
 }
 
 void pdcp_request_cancel(pdcp_bus_t *bus, uint8_t node)
@@ -168,11 +169,17 @@ static bool late(pdcp_bus_t *bus)
     return false;
 }
 
+/* Waits for the answer to a packet, which names no packet. */
+static bool is_packet(const pdcp_request_t *request)
+{
+    return request->state == PDCP_REQUEST_SET_DATA || request->state == PDCP_REQUEST_SET_ECHO;
+}
+
 /* What was sent has failed: the device wants a parameter by bulk, or a packet again, or it refuses. */
 static bool on_failure(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t result, pdcp_reply_t *reply)
 {
     const pdcp_request_t *request = &device->request;
-    if (request->state == PDCP_REQUEST_SET_DATA) {
+    if (is_packet(request)) {
         return restart_bulk(bus, device, reply);
     }
     if (request->state == PDCP_REQUEST_ANSWER && result == PDCP_USE_BULK && is_parameter(request)) {
@@ -180,6 +187,15 @@ static bool on_failure(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t result, pdc
         return false;
     }
     return finish(bus, device, PDCP_ERR_REFUSED, reply);
+}
+
+/* A packet that was sent more than once may be answered more than once. An answer that came later would be
+ * taken for that to the next packet, which may be lost: the next one waits (D-BUS-39). */
+static void await_echoes(pdcp_bus_t *bus, pdcp_node_t *device)
+{
+    device->request.tries_left = (uint8_t)(PDCP_TRIES - 1 - device->request.tries_left);
+    device->request.state = PDCP_REQUEST_SET_ECHO;
+    wait_for_answer(bus, device);
 }
 
 static bool on_success(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *msg, pdcp_reply_t *reply)
@@ -199,6 +215,16 @@ static bool on_success(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *m
     case PDCP_REQUEST_SET_DATA:
         request->offset = (uint16_t)(request->offset + packet_len(request));
         request->packet_id++;
+        if (request->tries_left < PDCP_TRIES - 1 && request->offset != request->size) {
+            await_echoes(bus, device);
+            return false;
+        }
+        break;
+    case PDCP_REQUEST_SET_ECHO:
+        request->tries_left--;
+        if (request->tries_left != 0) {
+            return false;
+        }
         break;
     default: /* PDCP_REQUEST_ANSWER */
         return finish(bus, device, PDCP_OK, reply);
@@ -267,7 +293,7 @@ bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *ms
         return on_packet(bus, device, msg, reply);
     }
     if (msg->code != (code_of(request) | PDCP_ANSWER) ||
-        (request->state != PDCP_REQUEST_SET_DATA && /* 8E names no parameter */
+        (!is_packet(request) && /* 8E names no parameter */
          (msg->param != request->param || msg->channel != request->channel))) {
         return late(bus);
     }
@@ -299,6 +325,10 @@ bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t node, pdcp_reply_t *reply
     pdcp_request_t *request = &device->request;
     reply_head(request, reply, request->value, 0);
     if (request->state == PDCP_REQUEST_IDLE) {
+        return false;
+    }
+    if (request->state == PDCP_REQUEST_SET_ECHO) { /* no more answers come */
+        enter(bus, device, PDCP_REQUEST_SET_DATA);
         return false;
     }
     if (request->tries_left != 0) {

@@ -33,7 +33,8 @@ typedef enum {
     PDCP_ERR_BULK = -3,    /* transfer failed PDCP_BULK_RESTARTS times, or the value is longer than allowed */
     PDCP_ERR_BUSY = -4,    /* not now: try again later */
     PDCP_ERR_UNKNOWN = -5, /* no such device or channel, or wrong direction */
-    PDCP_ERR_OWN = -6      /* an output never feeds an input of its own device (D-API-6) */
+    PDCP_ERR_OWN = -6,     /* an output never feeds an input of its own device (D-API-6) */
+    PDCP_ERR_SOLE = -7     /* another input wants the output for itself, as this one does (D-API-13) */
 } pdcp_status_t;
 
 typedef enum {
@@ -43,6 +44,8 @@ typedef enum {
     PDCP_REQUEST_GET_DATA, /* waiting for the device's next 0E */
     PDCP_REQUEST_SET_SIZE, /* 0D sent, waiting for 8D */
     PDCP_REQUEST_SET_DATA, /* 0E sent, waiting for 8E */
+    PDCP_REQUEST_SET_ECHO, /* 8E came, but 0E was sent more than once: waiting for its other answers
+                              (D-BUS-39) */
     PDCP_REQUEST_RAW,      /* a frame of the host sent, waiting for its answer */
     PDCP_REQUEST_STATES
 } pdcp_request_state_t;
@@ -58,7 +61,7 @@ typedef struct {
     uint8_t code;         /* function code of the request */
     uint8_t param;
     uint8_t channel;
-    uint8_t tries_left;
+    uint8_t tries_left; /* PDCP_REQUEST_SET_ECHO: answers that may still come */
     uint8_t restarts_left;
     uint8_t packet_id; /* next bulk packet */
     uint8_t value[PDCP_VALUE_MAX];
@@ -107,8 +110,8 @@ static inline void pdcp_request_command(struct pdcp_bus *bus, uint8_t node, pdcp
     pdcp_request_start(bus, node, client, code, 0, 0, NULL, time_ms);
 }
 
-/* Lets the request that is under way be sent no more than this once. */
-void pdcp_request_try_once(struct pdcp_bus *bus, uint8_t node);
+/* Limits the request that was just started to so many tries, 1 to PDCP_TRIES. */
+void pdcp_request_limit_tries(struct pdcp_bus *bus, uint8_t node, uint8_t tries);
 
 /* Forgets a request without a reply. */
 void pdcp_request_cancel(struct pdcp_bus *bus, uint8_t node);

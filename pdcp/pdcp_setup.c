@@ -90,14 +90,15 @@ static void write_step(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param)
     pdcp_channel_t *channel = current_channel(bus, device);
     uint8_t value = 0;
     if (param == PDCP_OUT_NODE_ID) {
-        if (channel->node_id == 0) {
-            pdcp_nodes_set_output_id(&bus->nodes, channel, pdcp_bind_output_id(bus));
+        if (channel->node_id == 0 && pdcp_bind_is_shut(bus)) {
+            pause(bus, device, (uint16_t)(PDCP_SHUT_MS - pdcp_bus_age_ms(bus)));
+            return;
         }
-        value = channel->node_id;
-        if (value == 0) {
+        if (channel->node_id == 0 && !pdcp_bind_give_output_id(bus, channel)) {
             no_room(bus, device);
             return;
         }
+        value = channel->node_id;
     }
     pdcp_request_set(bus, device->place, PDCP_CLIENT_SETUP, channel->index, param, &value, 1);
 }
@@ -174,6 +175,25 @@ void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, uint16_t time_ms)
     }
 }
 
+/* What is known of the node ids of a channel does not hold any more. */
+static void forget_id(pdcp_bus_t *bus, pdcp_channel_t *channel)
+{
+    if (channel->transfer == PDCP_OUTPUT && channel->node_id != 0) {
+        pdcp_bind_take_output_id(bus, channel);
+    }
+    channel->node_id = 0;
+}
+
+/* The channels of a device with a higher index than this are no more. */
+static void forget_ids_behind(pdcp_bus_t *bus, const pdcp_node_t *device, uint8_t count)
+{
+    for (uint8_t c = device->first_channel; c != PDCP_NONE; c = bus->nodes.channels[c].next) {
+        if (bus->nodes.channels[c].index > count) {
+            forget_id(bus, &bus->nodes.channels[c]);
+        }
+    }
+}
+
 /* Takes over a device parameter, a number or two. False: it does not fit, the attempt has failed. */
 static bool take_device(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param, uint16_t low, uint16_t high)
 {
@@ -193,6 +213,7 @@ static bool take_device(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param, uin
         device->profile = high;
         break;
     case PDCP_DEV_CHANNELS:
+        forget_ids_behind(bus, device, (uint8_t)(low & 0xFFu));
         if (!pdcp_nodes_set_channels(&bus->nodes, device->place, (uint8_t)(low & 0xFFu))) {
             pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
             return false;
@@ -213,7 +234,7 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
         return false;
     }
     if (channel->transfer != 0 && channel->transfer != transfer) {
-        pdcp_nodes_set_output_id(&bus->nodes, channel, 0);
+        forget_id(bus, channel);
         pdcp_nodes_drop_feed(&bus->nodes, number);
         channel->link = PDCP_LINK_NONE;
         channel->todo = PDCP_TODO_NONE;
@@ -236,7 +257,7 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
     case PDCP_CH_TRANSFER_TYPE:
         return take_direction(bus, number, (uint8_t)(low & 0xFFu));
     case PDCP_CH_ENABLED:
-        channel->enabled = false;
+        pdcp_link_is_disabled(bus, channel);
         break;
     case PDCP_IN_TERMINAL_PROFILE:
         channel->terminal_profile = low;

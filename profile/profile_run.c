@@ -417,11 +417,13 @@ bool profile_run_is_starting(const profile_run_t *run)
     return false;
 }
 
-/* When there will have been quiet for PROFILE_QUIET_MS, or was. */
+/* When there will have been quiet for PROFILE_QUIET_MS, or was. The time by which a grant was held is taken
+ * off (D-BUS-34).
+ */
 static uint32_t quiet_ms(const profile_run_t *run, const pdcp_arb_t *arb)
 {
     const bool asked = pdcp_time_before(run->stirred_ms, arb->asked_ms);
-    return (asked ? arb->asked_ms : run->stirred_ms) + PROFILE_QUIET_MS;
+    return (asked ? arb->asked_ms : run->stirred_ms) + PROFILE_QUIET_MS - arb->held_ms;
 }
 
 bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)

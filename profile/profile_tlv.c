@@ -20,10 +20,26 @@ void profile_tlv_init(profile_tlv_t *reader, profile_tlv_on_link_t on_link, void
     reader->ctx = ctx;
 }
 
+/* Number of the bit that stands for an identity. */
+static uint8_t name_of(const pdcp_identity_t *identity)
+{
+    const uint16_t hash = (uint16_t)(identity->vid * 31u + identity->pid * 7u + identity->sn);
+    return (uint8_t)((hash ^ (hash >> 8)) % (8u * PROFILE_TLV_NAMES_BYTES));
+}
+
+bool profile_tlv_names(const uint8_t names[PROFILE_TLV_NAMES_BYTES], const pdcp_identity_t *identity)
+{
+    return profile_bit(names, name_of(identity));
+}
+
 static void end_link(profile_tlv_t *reader)
 {
-    if ((reader->state & TLV_LINK) != 0 && reader->on_link != NULL) {
-        reader->on_link(reader->ctx, reader->number, &reader->link);
+    if ((reader->state & TLV_LINK) != 0) {
+        profile_set_bit(reader->names, name_of(&reader->link.input.owner), true);
+        profile_set_bit(reader->names, name_of(&reader->link.output.owner), true);
+        if (reader->on_link != NULL) {
+            reader->on_link(reader->ctx, reader->number, &reader->link);
+        }
     }
     reader->state = (uint8_t)(reader->state & ~(unsigned)TLV_OF_LINK);
     reader->end = 0;

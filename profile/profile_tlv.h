@@ -42,7 +42,8 @@ enum {
     PROFILE_TLV_LINK_BYTES = 57,         /* what a link takes */
     PROFILE_TLV_CONFIGURATION_BYTES = 6, /* what a configuration takes besides its links */
     PROFILE_TLV_FRAME_BYTES = 6,         /* what the string takes besides its configurations */
-    PROFILE_TLV_SET_BYTES = 32           /* a bit for each number from 0 to 255 */
+    PROFILE_TLV_SET_BYTES = 32,          /* a bit for each number from 0 to 255 */
+    PROFILE_TLV_NAMES_BYTES = 16         /* a bit for each hash of an identity */
 };
 
 /* Reader ------------------------------------------------------------------------------------------------- */
@@ -61,12 +62,13 @@ typedef enum {
 } profile_tlv_status_t;
 
 /* Reads a string of any length, byte by byte. It skips codes that it does not know, takes missing values as 0
- * and input and output of a link in either order. Members are private but for numbers. */
+ * and input and output of a link in either order. Members are private but for numbers and names. */
 typedef struct {
     profile_tlv_on_link_t on_link; /* NULL: nobody is told */
     void *ctx;
     profile_link_t link;                    /* the one being read */
     uint8_t numbers[PROFILE_TLV_SET_BYTES]; /* the configurations so far, bit n: configuration n */
+    uint8_t names[PROFILE_TLV_NAMES_BYTES]; /* the devices that its links name so far (profile_tlv_names) */
     uint8_t links[PROFILE_TLV_SET_BYTES];   /* the same for the links of this one */
     uint16_t configurations_told;           /* by code 1 */
     uint16_t links_missing;                 /* told by code 3 but not read; modulo 65536 */
@@ -90,6 +92,11 @@ static inline bool profile_tlv_has(const uint8_t set[PROFILE_TLV_SET_BYTES], uin
 {
     return profile_bit(set, number);
 }
+
+/* Does a link name this device? Now and then it is said of one that no link names: of one in eight when
+ * sixteen are named.
+ */
+bool profile_tlv_names(const uint8_t names[PROFILE_TLV_NAMES_BYTES], const pdcp_identity_t *identity);
 
 /* Writer ------------------------------------------------------------------------------------------------- */
 

@@ -8,6 +8,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pdcp_spec.h"
+
 /* The numbers are those on the wire. */
 typedef enum {
     PROFILE_SIZE_4 = 0,
@@ -43,7 +45,7 @@ typedef struct {
 #define PROFILE_TYPE_SIZE 0xC000u
 #define PROFILE_TYPE_DATA 0x3000u
 #define PROFILE_TYPE_CONTROL 0x0C00u
-#define PROFILE_TYPE_SOLE 0x0200u
+#define PROFILE_TYPE_SOLE PDCP_TYPE_SOLE
 #define PROFILE_TYPE_TERMINAL 0x0100u
 
 /* Takes a type word apart. False: a float that has not 16 bits (D-PRO-2); type is filled all the same. Unused

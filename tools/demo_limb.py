@@ -26,7 +26,7 @@ from rich.live import Live
 from rich.table import Table
 from rich.text import Text
 
-from pdcp import ChannelId, Client, Identity, LinkStatus, PdcpError
+from pdcp import ChannelId, Client, ConnectionFailedError, Identity, LinkStatus, PdcpError
 
 FOLDER = Path(__file__).resolve().parent / "demo.d"
 SENSOR, CONTROLLER, HAND, SPARE = (FOLDER / f"d{number}.ini" for number in (1, 2, 3, 4))
@@ -423,6 +423,10 @@ def demonstrate(options: argparse.Namespace) -> None:
         try:
             run(limb, console, options.once)
         except BrokenPipeError:
+            raise
+        except ConnectionFailedError as error:
+            if limb.pdcpd.ends():
+                raise limb.pdcpd.ended_error() from error
             raise
         except (OSError, PdcpError) as error:
             if limb.pdcpd.has_ended():

@@ -9,14 +9,17 @@ import subprocess
 import threading
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
 from types import TracebackType
 from typing import IO, NamedTuple, Self
 
 from pdcp import Identity
 
-LINE_TIMEOUT_S = 10.0
-END_TIMEOUT_S = 5.0
+# Only a program that hangs takes as long: a wait ends with what it waits for, however busy the machine is.
+LINE_TIMEOUT_S = 30.0
+END_TIMEOUT_S = 20.0
+GONE_TIMEOUT_S = 5.0
 
 
 class Value(NamedTuple):
@@ -79,6 +82,12 @@ class Program:
 
     def has_ended(self) -> bool:
         return self.process.poll() is not None
+
+    def ends(self) -> bool:
+        """Waits for the end of a program whose line is gone: the kernel closes its files a moment before it ends."""
+        with suppress(subprocess.TimeoutExpired):
+            self.wait(GONE_TIMEOUT_S)
+        return self.has_ended()
 
     def ended_error(self) -> EndedError:
         """Says how it ended and what it had to say about it."""

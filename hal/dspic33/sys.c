@@ -113,7 +113,7 @@ void sys_idle(bool (*has_work)(void *ctx), void *ctx)
 }
 
 /* FNV-1a over the words of noise; stirred on each call, so that it never gives the same number twice. */
-static uint32_t draw(void)
+uint32_t hal_sys_random(void)
 {
     uint32_t hash = 2166136261uL;
     sys_noise[0]++;
@@ -131,5 +131,5 @@ uint32_t hal_sys_serial(void)
     const uint16_t low = __builtin_tblrdl((uint16_t)PART_SERIAL_AT);
     const uint16_t high = __builtin_tblrdl((uint16_t)PART_SERIAL_AT + 2u);
     const uint32_t serial = (uint32_t)high << 16 | low;
-    return serial != 0xFFFFFFFFuL ? serial : draw();
+    return serial != 0xFFFFFFFFuL ? serial : hal_sys_random();
 }

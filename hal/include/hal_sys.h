@@ -8,4 +8,8 @@
  * a random one, another at every call. May be called from anywhere. */
 uint32_t hal_sys_serial(void);
 
+/* A number that differs from call to call and, as far as the target can, from start to start. May be called
+ * from anywhere. */
+uint32_t hal_sys_random(void);
+
 #endif

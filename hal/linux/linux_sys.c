@@ -4,9 +4,14 @@
 
 #include <sys/random.h>
 
+uint32_t hal_sys_random(void)
+{
+    uint32_t number = 0;
+    (void)getrandom(&number, sizeof number, 0);
+    return number;
+}
+
 uint32_t hal_sys_serial(void)
 {
-    uint32_t serial = 0;
-    (void)getrandom(&serial, sizeof serial, 0);
-    return serial;
+    return hal_sys_random();
 }

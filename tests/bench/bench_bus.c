@@ -110,6 +110,9 @@ static void listen(void *ctx, uint64_t time_us, const can_frame_t *frame)
     if (log->frames++ == 0) {
         log->first_us = time_us - own_us;
     }
+    if (frame->data[0] == (PDCP_BIND_DEVICE | PDCP_ANSWER) && log->hold_us == 0) {
+        log->hold_us = time_us - own_us - log->first_us - log->own_us;
+    }
     log->last_us = time_us;
     log->own_us += own_us;
     if ((frame->data[0] & 0x7Fu) == PDCP_BIND_DEVICE) {
@@ -165,7 +168,8 @@ static bool start_member(bench_bus_t *bench, uint8_t number)
 
 bool bench_bus_start(bench_bus_t *bench, uint8_t devices)
 {
-    const arb_settings_t settings = {.serial = 1};
+    /* The seed gives outputs ids from 254 downwards (D-BUS-36). */
+    const arb_settings_t settings = {.serial = 1, .seed = PDCP_NODE_MAX - PDCP_NODE_MIN};
     memset(bench, 0, sizeof *bench);
     memset(bench->nvm, 0xFF, sizeof bench->nvm);
     sim_bus_init(&bench->bus);

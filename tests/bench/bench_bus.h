@@ -42,6 +42,7 @@ typedef struct {
     uint64_t first_us;     /* start of the first frame that is no beacon */
     uint64_t last_us;      /* end of the last one */
     uint64_t bind_last_us; /* end of the last bind answer */
+    uint64_t hold_us;      /* the bus was idle so long before the first bind answer: it is held (D-BUS-42) */
     can_frame_t answers[BENCH_ANSWERS_MAX]; /* of device 0 to the requests of its setup, in their order */
     uint32_t answer_count;
 } bench_log_t;

@@ -166,6 +166,9 @@ static void do_bulk(job_t *job, uint32_t count)
 static void do_channel_data(job_t *job, uint32_t count)
 {
     const uint32_t before = job->app->arb.bus.stats[PDCP_STAT_CHANNEL_DATA];
+    for (uint32_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        job->app->arb.bus.nodes.channels[i].enabled = true; /* else their data is a stranger's (D-BUS-36) */
+    }
     for (uint32_t i = 0; i < count; i++) {
         const can_frame_t frame = {.id = (uint16_t)(PDCP_NODE_MAX - i % (2u * BENCH_DEVICES)), .dlc = 2};
         take(job, &frame);

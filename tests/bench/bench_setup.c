@@ -30,6 +30,7 @@ int main(int argc, char **argv)
     printf("own_us %llu\n", (unsigned long long)log->own_us);
     printf("bind_bus_us %llu\n", (unsigned long long)log->bind_bus_us);
     printf("bind_elapsed_us %llu\n", (unsigned long long)(log->bind_last_us - log->first_us));
+    printf("hold_us %llu\n", (unsigned long long)log->hold_us);
     printf("elapsed_us %llu\n", (unsigned long long)(log->last_us - log->first_us));
     return 0;
 }

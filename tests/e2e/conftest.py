@@ -1,5 +1,6 @@
 """What all end-to-end tests need: the programs, started and stopped with the test."""
 
+import signal
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -12,6 +13,9 @@ sys.path[:0] = [str(ROOT / "tools"), str(ROOT / "tests/support")]
 
 from programs import Pdcpd, Program  # noqa: E402
 from rawhost import RawHost  # noqa: E402
+
+# A job in the background ignores SIGINT, and so would every program that the tests start and end with Ctrl-C.
+signal.signal(signal.SIGINT, signal.default_int_handler)
 
 DEFAULT_BIN = ROOT / "build/default/bin"
 NODE_IDS = {"d1": 16, "d2": 32, "d3": 48}

@@ -8,13 +8,14 @@ import contextlib
 import io
 import json
 import os
-import queue
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
+from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
@@ -24,15 +25,18 @@ import pytest
 from pdcp.cli import app
 from pdcp.cli.common import run
 from pdcp.counters import GROUPS
+from pdcp.events import CanFrame
+from pdcp.model import ProfileState
 from pdcp.wire import Frame
-from programs import Pdcpd, Program, until
+from programs import LINE_TIMEOUT_S, Pdcpd, Program, Value, until
 from scripted import ScriptedArbitrator
 
-from pdcp import Client
+from pdcp import Client, EventKind
 
 COMMAND = Path(sys.executable).with_name("pdcp")
 SCHEMAS = Path(__file__).resolve().parent / "schemas"
-RUN_TIMEOUT_S = 20.0
+RUN_TIMEOUT_S = 60.0  # only a command that hangs takes as long
+BEACON_ID = 0x100  # of the arbitrator
 
 Json = Any
 Start = Callable[..., Pdcpd]
@@ -116,9 +120,11 @@ class Cli:
 
 
 def await_limb(port: str) -> str:
-    """Three devices, four inputs, four outputs; returns the port."""
+    """Three devices, four inputs, four outputs, and the profile layer's start-up is over, which comes half a second
+    after the last setup and tells its configuration: from now on a limb that is left alone rests. Returns the port."""
     with Client(port) as client:
         until(lambda: client.system_info()[:3] == (3, 4, 4), "the limb is set up")
+        until(lambda: client.info().profile_state is ProfileState.RUNNING, "the start-up is over")
     return port
 
 
@@ -433,23 +439,39 @@ def test_flags(limb_cli: Callable[..., Cli]) -> None:
 
 
 class Values:
-    """What arrives at the hand."""
+    """What arrives at the hand, without safe values."""
 
     def __init__(self, pdcpd: Pdcpd) -> None:
-        self._pdcpd = pdcpd
+        self._queue = pdcpd.values
 
-    def arrive(self, within_s: float = 2.0) -> bool:
-        """Does a new one come? Those that are there already do not count."""
-        while not self._pdcpd.values.empty():
-            self._pdcpd.values.get()
-        deadline_s = time.monotonic() + within_s
-        while (left_s := deadline_s - time.monotonic()) > 0:
-            try:
-                if not self._pdcpd.values.get(timeout=left_s).safe:
-                    return True
-            except queue.Empty:
-                return False
-        return False
+    def _next(self) -> Value:
+        while (value := self._queue.get(timeout=LINE_TIMEOUT_S)).safe:
+            pass
+        return value
+
+    def await_new(self) -> None:
+        """Those that are there already do not count."""
+        while not self._queue.empty():
+            self._queue.get()
+        self._next()
+
+    def until_behind(self, time_ms: int) -> list[Value]:
+        """All up to the first one behind this time."""
+        values = [self._next()]
+        while values[-1].time_ms <= time_ms:
+            values.append(self._next())
+        return values
+
+
+def half_a_second(port: str) -> tuple[int, int]:
+    """The times of two beacons of the arbitrator, one after the other. An earlier one goes before them: what was on its
+    way when this was called has arrived by then."""
+    with Client(port) as client:
+        client.stream((EventKind.CAN_FRAME,))
+        frames = (event for event in client.events(LINE_TIMEOUT_S) if isinstance(event, CanFrame))
+        _, begin_ms, end_ms = (frame.time_ms for frame in islice((f for f in frames if f.can_id == BEACON_ID), 3))
+        client.stream(())
+    return begin_ms, end_ms
 
 
 def test_suspend_release_reset(limb: Start) -> None:
@@ -457,20 +479,21 @@ def test_suspend_release_reset(limb: Start) -> None:
     cli = Cli(await_limb(pdcpd.port()))
     values = Values(pdcpd)
     cli.good("autoconfig", "now")
-    assert values.arrive()
+    values.await_new()
     for device in ([], ["2:2:4", "2:2:5"]):
         assert cli("suspend", *device, "--json").json("told") == {"devices": device or "all"}
-        assert not values.arrive(0.3)
+        begin_ms, end_ms = half_a_second(pdcpd.port())
         assert cli.good("release", *device).output == f"{', '.join(device) or 'all devices'}: released\n"
-        assert values.arrive()
+        arrived = values.until_behind(end_ms)
+        assert not [value for value in arrived if begin_ms <= value.time_ms <= end_ms]
     cli.good("suspend", "2:2:4", "--ms", "200")
-    assert values.arrive()
+    values.await_new()
     for device in (["2:2:5"], []):
         cli.good("reset", *device)
         await_limb(cli.environment["PDCP_PORT"])
         with Client(cli.environment["PDCP_PORT"]) as client:
             until(lambda client=client: [link.status for link in client.links()] == [2, 2, 2], "all links")  # type: ignore[misc]
-        assert values.arrive()
+        values.await_new()
     assert "9:9:9: unknown device" in cli.fails(1, "reset", "9:9:9")
     assert "unknown device" in cli.fails(1, "suspend", "9:9:9")
 
@@ -515,14 +538,20 @@ def test_watch(start: Start, start_node: StartNode, files: dict[str, Path]) -> N
     assert cli("info", "--json").json("info")["arbitrator"]["flags"]["event-stream"] is False
 
 
-def test_watch_as_text(limb: Start) -> None:
-    """One line an event where there is no terminal; ends after so many, or so long."""
-    cli = Cli(await_limb(limb().port()))
-    lines = cli.good("watch", "--frames", "--count", "3").output.splitlines()
+def test_watch_as_text(quiet: Cli) -> None:
+    """One line an event where there is no terminal; ends after so many."""
+    lines = quiet.good("watch", "--frames", "--count", "3").output.splitlines()
     assert len(lines) == 3 and all("frame" in line and "#" in line for line in lines)
+
+
+def test_watch_for_a_time(scripted: Callable[..., ScriptedArbitrator]) -> None:
+    """It shows what comes, and ends when the time is over, no earlier."""
+    lost = Frame(0x2419, 0, bytes.fromhex("02 A8 61 00 00 02 00 02 00 04 00 10"))
+    peer = scripted(lambda frame: [Frame(0x2417, frame.reference), *([lost] if frame.payload != b"\0" else [])])
     start_s = time.monotonic()
-    assert cli.good("watch", "--for", "0.5").output == ""
+    assert Cli(peer.port).good("watch", "--for", "0.5").words() == "25.000 device lost 2:2:4, node 16"
     assert time.monotonic() - start_s >= 0.5
+    assert [frame.message for frame in peer.requests] == [0x2416, 0x2416]
 
 
 # --- without an arbitrator ---
@@ -703,32 +732,46 @@ def test_an_arbitrator_of_the_source(scripted: Callable[..., ScriptedArbitrator]
     assert "does not know message 2413h" in cli.fails(1, "stats")
 
 
-def test_progress(scripted: Callable[..., ScriptedArbitrator]) -> None:
+def read_all(terminal: int, on_text: Callable[[bytes], None]) -> bytes:
+    """What a pseudo-terminal shows until nobody has it open; on_text gets all of it so far, whenever more has come."""
+    text = b""
+    with contextlib.suppress(OSError):  # the end of a pseudo-terminal
+        while data := os.read(terminal, 4096):
+            text += data
+            on_text(text)
+    os.close(terminal)
+    return text
+
+
+@pytest.mark.parametrize(("command", "seen"), [(["get", "2:2:4"], True), (["get", "2:2:4", "node-id"], False)])
+def test_progress(command: list[str], seen: bool, scripted: Callable[..., ScriptedArbitrator]) -> None:
     """After a second a terminal gets a bar, on standard error, which goes again; the output stays as it is."""
+    shown = threading.Event()
 
-    def slow(frame: Frame) -> list[Frame]:
-        if frame.message == 0x2301:
-            time.sleep(0.2)  # as if a device were slow
-            return [Frame(0x2302, frame.reference, b"\x01\0\0\0")]
-        return [Frame(frame.message + 2, frame.reference, b"\x06")]
+    def answer(frame: Frame) -> list[Frame]:
+        if frame.message != 0x2301:
+            return [Frame(frame.message + 2, frame.reference, b"\x06")]
+        if seen:
+            shown.wait(RUN_TIMEOUT_S)  # as if a device were slow
+        return [Frame(0x2302, frame.reference, b"\x01\0\0\0")]
 
-    cli = Cli(scripted(slow).port)
+    def look(text: bytes) -> None:
+        if b"reading parameters" in text:
+            shown.set()
+
+    cli = Cli(scripted(answer).port)
     cli.environment["TERM"] = "xterm"
-    for command, seen in ((["get", "2:2:4"], True), (["get", "2:2:4", "node-id"], False)):
-        master, slave = os.openpty()
-        process = subprocess.Popen(
-            [COMMAND, *command], stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=slave, env=cli.environment
-        )
-        os.close(slave)
-        output, _ = process.communicate(timeout=RUN_TIMEOUT_S)
-        errors = b""
-        with contextlib.suppress(OSError):  # the end of a pseudo-terminal
-            while data := os.read(master, 4096):
-                errors += data
-        os.close(master)
-        assert process.returncode == 0
-        assert b"reading" not in output and b"\x1b" not in output
-        assert (b"reading parameters" in errors) is seen, errors
+    master, slave = os.openpty()
+    process = subprocess.Popen(
+        [COMMAND, "--timeout", str(RUN_TIMEOUT_S), *command],
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=slave, env=cli.environment,
+    )  # fmt: skip
+    os.close(slave)
+    errors = read_all(master, look)
+    output, _ = process.communicate(timeout=RUN_TIMEOUT_S)
+    assert process.returncode == 0
+    assert b"reading" not in output and b"\x1b" not in output
+    assert shown.is_set() is seen, errors
 
 
 def test_a_reader_that_goes_away(quiet: Cli) -> None:

@@ -17,6 +17,7 @@ from pdcp import Identity
 ROOT = Path(__file__).resolve().parents[2]
 SINE = Sine(0, 255, 2000, 20)
 HAND = Identity(2, 2, 6)
+END_TIMEOUT_S = 60  # only a program that hangs takes as long
 
 Demo = Callable[..., subprocess.Popen[str]]
 
@@ -70,7 +71,7 @@ def line_with(process: subprocess.Popen[str], part: str) -> str:
 
 def test_once(demo: Demo) -> None:
     process = demo("--once")
-    output, errors = process.communicate(timeout=20)
+    output, errors = process.communicate(timeout=END_TIMEOUT_S)
     assert (process.returncode, errors) == (0, "")
     for words in (
         "D1 sensor 2:2:4",
@@ -94,7 +95,7 @@ def test_a_signal_ends_all(number: signal.Signals, status: int, demo: Demo) -> N
     line_with(process, " s   wrist motor")
     started = children(process.pid)
     process.send_signal(number)
-    _, errors = process.communicate(timeout=10)
+    _, errors = process.communicate(timeout=END_TIMEOUT_S)
     assert (process.returncode, errors) == (status, "")
     assert not any(is_alive(pid) for pid in started)
 
@@ -114,7 +115,7 @@ def test_a_reader_that_goes(demo: Demo) -> None:
     started = children(process.pid)
     assert process.stdout is not None
     process.stdout.close()
-    assert process.wait(10) != 0
+    assert process.wait(END_TIMEOUT_S) != 0
     assert process.stderr is not None
     assert process.stderr.read() == ""
     assert not any(is_alive(pid) for pid in started)
@@ -126,7 +127,7 @@ def test_pdcpd_dies(when: str, demo: Demo) -> None:
     line_with(process, when)
     pdcpd = child(process.pid, "pdcpd")
     os.kill(pdcpd, signal.SIGKILL)
-    _, errors = process.communicate(timeout=10)
+    _, errors = process.communicate(timeout=END_TIMEOUT_S)
     assert process.returncode == 1
     assert errors == "demo: pdcpd ended early (signal SIGKILL)\n"
 
@@ -137,7 +138,7 @@ def test_pdcpd_does_not_start(demo: Demo, tmp_path: Path) -> None:
     fake.write_text("#!/bin/sh\necho 'pdcpd: no' >&2\nexit 2\n", encoding="ascii")
     fake.chmod(0o755)
     process = demo("--bin", tmp_path)
-    output, errors = process.communicate(timeout=10)
+    output, errors = process.communicate(timeout=END_TIMEOUT_S)
     assert (process.returncode, output, errors) == (1, "", "demo: pdcpd ended early (exit status 2)\npdcpd: no\n")
 
 
@@ -145,9 +146,8 @@ def test_pdcpd_does_not_start(demo: Demo, tmp_path: Path) -> None:
 @pytest.mark.parametrize("argument", ["--nonsense", "nonsense"])
 def test_wrong_arguments(script: str, argument: str) -> None:
     command = [sys.executable] if script.endswith(".py") else []
-    result = subprocess.run(
-        [*command, ROOT / "tools" / script, argument], capture_output=True, text=True, timeout=10, check=False
-    )
+    words: list[str | Path] = [*command, ROOT / "tools" / script, argument]
+    result = subprocess.run(words, capture_output=True, text=True, timeout=END_TIMEOUT_S, check=False)
     assert (result.returncode, result.stdout) == (2, "")
     assert len(result.stderr.splitlines()) == 1
     assert argument in result.stderr

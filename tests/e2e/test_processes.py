@@ -1,5 +1,6 @@
 """Devices as processes of their own on the simulated bus: links, values, loss and return."""
 
+import struct
 import threading
 import time
 from collections.abc import Callable
@@ -7,9 +8,9 @@ from contextlib import ExitStack
 from pathlib import Path
 from queue import Empty
 
-import can
 import pytest
-from programs import Pdcpd, Program, Value, until
+from programs import LINE_TIMEOUT_S, Pdcpd, Program, Value, until
+from simbus import open_sim_bus
 
 from pdcp import ChannelId, Client, Identity, LinkStatus, RequestError
 
@@ -20,45 +21,53 @@ LINKS = {
     (ChannelId(D2, 3), ChannelId(D3, 1)),
     (ChannelId(D2, 5), ChannelId(D3, 2)),
 }
-BEACON_MS = 100
+BEACON_MS = 200
+IDS_KEPT_S = 10.0
 NODE_ID = 8  # parameter of a device
+OUTPUT_ID = 5  # parameter of an output
 
 Start = Callable[..., Pdcpd]
 StartNode = Callable[..., Program]
 
 
 class Candump(threading.Thread):
-    """Keeps every frame on the bus, to be printed when a test fails."""
+    """Keeps every frame on the bus; what is not channel data is printed when a test fails."""
 
     def __init__(self, port: int) -> None:
         super().__init__(daemon=True)
-        self.lines: list[str] = []
+        self.frames: list[tuple[float, int, bytes]] = []
         self._ends = False
-        self._bus = can.Bus(interface="socketcand", host="127.0.0.1", port=port, channel="any")
+        self._bus = open_sim_bus(port)
         self.start()
 
     def run(self) -> None:
         while not self._ends:
             message = self._bus.recv(0.05)
-            # ChannelId data would hide everything else.
-            if message is not None and (message.arbitration_id >= 0x100 or bytes(message.data) == b"\x0a"):
-                self.lines.append(
-                    f"({message.timestamp:.6f}) can0 {message.arbitration_id:03X}#{bytes(message.data).hex().upper()}"
-                )
+            if message is not None:
+                self.frames.append((message.timestamp, message.arbitration_id, bytes(message.data)))
+
+    def data_of(self, output_id: int) -> list[int]:
+        """The one byte of each frame with channel data from an output."""
+        return [data[0] for _, identifier, data in self.frames if identifier == output_id]
 
     def close(self) -> None:
         self._ends = True
         self.join()
         self._bus.shutdown()
-        print("\n".join(self.lines))
+        for time_s, identifier, data in self.frames:
+            if identifier >= 0x100 or data == b"\x0a":
+                print(f"({time_s:.6f}) can0 {identifier:03X}#{data.hex().upper()}")
 
 
 class Limb:
-    """pdcpd, three processes with one device each, and a host."""
+    """pdcpd, three processes with one device each, a host, and a log of the bus."""
 
-    def __init__(self, pdcpd: Pdcpd, files: dict[str, Path], start_node: StartNode, host: Client) -> None:
+    def __init__(
+        self, pdcpd: Pdcpd, files: dict[str, Path], start_node: StartNode, host: Client, log: Candump
+    ) -> None:
         self.pdcpd = pdcpd
         self.host = host
+        self.log = log
         self._files = files
         self._start_node = start_node
         self.nodes: dict[str, Program] = {}
@@ -99,7 +108,7 @@ class Limb:
             queue.get()
         values: list[Value] = []
         counts = {1: 0, 2: 0}
-        deadline = time.monotonic() + 5
+        deadline = time.monotonic() + LINE_TIMEOUT_S
         while min(counts.values()) < count:
             try:
                 value = queue.get(timeout=max(0.0, deadline - time.monotonic()))
@@ -122,7 +131,13 @@ def limb(
     pdcpd = start("--can", "sim:0")
     log = Candump(pdcpd.bus_port())
     stack.callback(log.close)
-    return Limb(pdcpd, files, start_node, connect(pdcpd))
+    return Limb(pdcpd, files, start_node, connect(pdcpd), log)
+
+
+def is_part(values: list[int], of: list[int]) -> bool:
+    """Are these values in the list, in their order? On a busy machine the controller drops some."""
+    rest = iter(of)
+    return all(value in rest for value in values)
 
 
 def test_values_arrive(limb: Limb) -> None:
@@ -130,11 +145,12 @@ def test_values_arrive(limb: Limb) -> None:
     limb.make_links()
     assert [limb.host.get_parameter(ChannelId(each), NODE_ID) for each in (D1, D2, D3)] == [b"\x10", b"\x20", b"\x30"]
     assert limb.is_linked()
+    sensor_id = limb.host.get_parameter(ChannelId(D1, 1), OUTPUT_ID)[0]
     values = limb.arriving(60)  # 1.2 s of 2: more than a half turn
     wrist = [value.value for value in values if value.channel == 1 and value.value is not None]
     assert {value.device for value in values} == {D3}
     assert min(wrist) >= 0 and max(wrist) <= 255 and max(wrist) - min(wrist) > 100
-    assert all(abs(a - b) <= 20 for a, b in zip(wrist, wrist[1:], strict=False)), f"no sine: {wrist}"
+    until(lambda: is_part(wrist, limb.log.data_of(sensor_id)), f"the sensor has sent {wrist}")
     grip = {value.value for value in values if value.channel == 2}
     assert grip == {0, 1}
 
@@ -150,7 +166,7 @@ def test_a_device_is_lost_and_comes_back(limb: Limb, name: str) -> None:
     until(lambda: limb.names() == set(IDENTITIES.values()) - {lost}, "only the other two devices are there")
     hit = {link for link in LINKS if lost in (link[0].identity, link[1].identity)}
     expected = {link: LinkStatus.INACTIVE if link in hit else LinkStatus.ACTIVE for link in LINKS}
-    until(lambda: limb.links() == expected, f"links are {expected}", 2)
+    until(lambda: limb.links() == expected, f"links are {expected}")
     with pytest.raises(RequestError) as error:
         limb.host.get_parameter(ChannelId(lost), NODE_ID)
     assert error.value.code == 0x03
@@ -181,8 +197,7 @@ def test_a_sensor_is_away_for_longer_than_its_ids_are_kept(limb: Limb) -> None:
     old_id = limb.host.get_parameter(ChannelId(D1), NODE_ID)
     limb.nodes["d1"].kill()
     until(lambda: limb.names() == {D2, D3}, "the sensor is gone")
-    later_s = time.monotonic() + 10.5
-    until(lambda: time.monotonic() > later_s, "10.5 s have passed", 12)
+    time.sleep(IDS_KEPT_S + 0.5)
     assert limb.links()[(ChannelId(D1, 1), ChannelId(D2, 2))] == LinkStatus.INACTIVE
     limb.forget_asked_id("d1")
     limb.start("d1")
@@ -206,7 +221,7 @@ def test_hand_goes_to_its_safe_value(limb: Limb) -> None:
                 safe.add(value.channel)
         return safe == {1, 2}
 
-    until(is_safe, "both inputs of the hand are safe", 3)
+    until(is_safe, "both inputs of the hand are safe")
 
 
 def test_identities_keep_their_ids(
@@ -218,11 +233,17 @@ def test_identities_keep_their_ids(
         text = path.read_text(encoding="utf-8")
         path.write_text("".join(line for line in text.splitlines(True) if "node_id" not in line), encoding="utf-8")
     found = []
+
+    def is_stored(ids: list[bytes]) -> bool:
+        memory = nvm.read_bytes()
+        identities = (struct.pack("<HHH", device.vid, device.pid, device.sn) for device in (D1, D2, D3))
+        return all(identity + node_id in memory for identity, node_id in zip(identities, ids, strict=True))
+
     for _ in range(3):
         pdcpd = start("--nvm", nvm, *(word for path in files.values() for word in ("--node", path)))
         host = connect(pdcpd)
         until(lambda host=host: host.system_info()[:3] == (3, 4, 4), "three devices are set up")  # type: ignore[misc]
         found.append([host.get_parameter(ChannelId(each), NODE_ID) for each in (D1, D2, D3)])
-        until(lambda: nvm.read_bytes().count(0xFF) < nvm.stat().st_size - 20, "the table is stored")
+        until(lambda: is_stored(found[-1]), "the table is stored")
         assert pdcpd.stop() == 0
     assert found == [found[0]] * 3

@@ -15,7 +15,7 @@ OUT, SWITCH, MUSCLE = ChannelId(D1, 1), ChannelId(D2, 1), ChannelId(D2, 2)
 WRIST, GRIP = ChannelId(D3, 1), ChannelId(D3, 2)
 LINKS = {(OUT, MUSCLE), (ChannelId(D2, 3), WRIST), (ChannelId(D2, 5), GRIP)}
 LINKS_SPARE = {(ChannelId(D4, 1), MUSCLE), (ChannelId(D2, 3), WRIST), (ChannelId(D2, 5), GRIP)}
-BEACON_MS = 100
+BEACON_MS = 200
 
 Links = set[tuple[ChannelId, ChannelId]]
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from programs import Pdcpd, until
+from programs import END_TIMEOUT_S, Pdcpd, until
 from rawhost import RawHost
 
 from pdcp import ChannelId, Client, Identity, Link, LinkStatus
@@ -24,8 +24,9 @@ def run(programs: Path) -> Run:
     """run(PROGRAM, ARGUMENT...): exit status and the lines of standard error of a program that ends by itself."""
 
     def run_program(name: str, *arguments: str | Path) -> tuple[int, list[str]]:
+        words = [programs / name, *arguments]
         result = subprocess.run(
-            [programs / name, *arguments], stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=10
+            words, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=END_TIMEOUT_S, check=False
         )
         assert result.stdout == ""
         return result.returncode, result.stderr.splitlines()
@@ -90,7 +91,7 @@ def test_pdcp_node_wrong_use(arguments: list[str], parts: list[str], run: Run) -
 
 @pytest.mark.parametrize("program", ["pdcpd", "pdcp-node"])
 def test_version(program: str, programs: Path) -> None:
-    result = subprocess.run([programs / program, "--version"], capture_output=True, text=True, timeout=10)
+    result = subprocess.run([programs / program, "--version"], capture_output=True, text=True, timeout=END_TIMEOUT_S)
     assert result.returncode == 0
     assert re.fullmatch(rf"{program} \d+\.\d+\.\d+\n", result.stdout)
 
@@ -250,5 +251,5 @@ def test_nothing_is_left_in_the_working_folder(programs: Path, tmp_path: Path) -
         assert process.stdout.readline().startswith("host /dev/")
     finally:
         process.terminate()
-        assert process.wait(5) == 0
+        assert process.wait(END_TIMEOUT_S) == 0
     assert list(tmp_path.iterdir()) == []

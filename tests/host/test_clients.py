@@ -36,6 +36,8 @@ OUTPUT, INPUT = ChannelId(SENSOR, 1), ChannelId(HAND, 2)
 INFO_BYTES = bytes.fromhex("01 02 03 04 40 C8 64 02 01 03 13")
 INFO = ArbitratorInfo(1, (2, 3, 4), Limits(64, 200, 100), ProfileState.RUNNING, 1, 3, Flags(0x13))
 
+LONG_S = 1000.0  # a wait that does not end with its event outlasts the test (tests/CMakeLists.txt)
+
 Make = Callable[[Script], ScriptedArbitrator]
 Operation = Callable[[Any], Any]  # of a client of either kind: returns a value, or an awaitable of one
 Run = Callable[..., Any]
@@ -312,7 +314,7 @@ def test_a_silent_arbitrator(run: Run, arbitrator: Make) -> None:
     start_s = time.monotonic()
     with pytest.raises(NoAnswerError, match="0.1 s"):
         run(peer.port, lambda c: c.system_info(), timeout_s=0.1)
-    assert 0.2 <= time.monotonic() - start_s < 2.0
+    assert time.monotonic() - start_s >= 0.2
     assert len({frame.reference for frame in peer.requests}) == len(peer.requests) == 2
     with pytest.raises(NoAnswerError):
         run(peer.port, lambda c: c.unlink(INPUT), timeout_s=0.1)
@@ -438,24 +440,22 @@ def test_events_come_with_answers(run: Run, arbitrator: Make) -> None:
 
 
 def test_an_event_that_is_waited_for(run: Run, arbitrator: Make) -> None:
-    """It comes while nobody asks for anything."""
+    """It comes while nobody asks for anything, and nobody waits until the time is over."""
     peer = arbitrator(answers({}))
     sender = threading.Timer(0.1, peer.send, [encode(0x2419, 0, b"\x02\x02\0\0\0" + HAND_BYTES + b"\x10")])
 
     async def listen() -> Event:
         async with AsyncClient(peer.port) as client:
             sender.start()
-            return await anext(client.events(20.0))
+            return await anext(client.events(LONG_S))
 
-    start_s = time.monotonic()
     if run is run_sync:
         with Client(peer.port) as client:
             sender.start()
-            event = next(client.events(20.0))
+            event = next(client.events(LONG_S))
     else:
         event = asyncio.run(listen())
     assert event == DeviceLost(2, 2, HAND, 16)
-    assert time.monotonic() - start_s < 10.0
 
 
 # --- asyncio ---
@@ -471,7 +471,7 @@ def test_waiting_for_events_ends_with_the_line(arbitrator: Make) -> None:
     peer = arbitrator(script)
 
     async def next_event(client: AsyncClient) -> Event:
-        return await anext(client.events(20.0))
+        return await anext(client.events(LONG_S))
 
     async def listen() -> None:
         async with AsyncClient(peer.port) as client:
@@ -480,7 +480,7 @@ def test_waiting_for_events_ends_with_the_line(arbitrator: Make) -> None:
             with pytest.raises(ConnectionFailedError, match="gone"):
                 await client.system_info()
             with pytest.raises(ConnectionFailedError, match="gone"):
-                await asyncio.wait_for(waiting, 5.0)
+                await waiting
 
     asyncio.run(listen())
 
@@ -505,7 +505,7 @@ def test_a_cancelled_request_leaves_nothing_behind(arbitrator: Make) -> None:
             cancelled = [asyncio.wait_for(client.get_parameter(INPUT, 2), 0.05) for _ in range(5)]
             ends = await asyncio.gather(*cancelled, return_exceptions=True)
             assert [type(end) for end in ends] == [TimeoutError] * 5
-            return await asyncio.wait_for(client.system_info(), 2.0)
+            return await client.system_info()
 
     assert asyncio.run(ask()) == SystemInfo(0, 0, 0, 0)
 

@@ -291,7 +291,7 @@ void limb_begin(limb_t *limb, uint32_t seed, uint32_t clock_ms)
 {
     memset(limb, 0, sizeof *limb);
     limb->seed = seed;
-    limb->settings = (arb_settings_t){.serial = seed};
+    limb->settings = (arb_settings_t){.serial = seed, .seed = seed};
     sim_nvm_init(&limb->nvm);
     sim_nvm_port(&limb->nvm, &limb->memory);
     sim_world_init(&limb->world, 0, clock_ms);
@@ -302,7 +302,8 @@ void limb_begin(limb_t *limb, uint32_t seed, uint32_t clock_ms)
 void limb_start(limb_t *limb, uint32_t seed, uint32_t clock_ms)
 {
     limb_begin(limb, seed, clock_ms);
-    limb->settings = (arb_settings_t){.serial = seed, .strict_crc = true, .no_autoconfig = true};
+    limb->settings =
+        (arb_settings_t){.serial = seed, .seed = seed, .strict_crc = true, .no_autoconfig = true};
     limb_stop_arbitrator(limb);
     limb_start_arbitrator(limb);
     for (int i = 0; i < LIMB_DEVICES; i++) {

@@ -878,9 +878,12 @@ static void test_nothing_is_saved_on_standby(void)
         limb_run_ms(limb, 1);
     }
     TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(limb, 1, 1, 2, 1)); /* a change that is to be saved */
-    for (int i = 0; i < 8; i++) {
+    for (int i = 0; i < 16; i++) { /* it serves: a device answers it (D-BUS-42) */
+        const uint8_t id = pdcp_device_node_id(sim_node_device(limb->parts[0].node));
+        const can_frame_t question = {.id = (uint16_t)(0x300u + id), .dlc = 3, .data = {0x03, 0x0A, 0x00}};
         TEST_ASSERT_TRUE(sim_bus_send(&limb->world.bus, port, &beacon));
-        limb_run_ms(limb, 1000);
+        TEST_ASSERT_TRUE(sim_bus_send(&limb->world.bus, port, &question));
+        limb_run_ms(limb, 500);
     }
     TEST_ASSERT_EQUAL(1, limb->events[PDCP_EVENT_SILENT]);
     TEST_ASSERT_EQUAL(0, limb->app.limb.config.stored);

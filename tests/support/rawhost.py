@@ -6,6 +6,7 @@ import time
 from pdcp.errors import NoAnswerError
 from pdcp.transport import SerialTransport
 from pdcp.wire import HEADER_SIZE, SYNC, Frame, encode
+from programs import LINE_TIMEOUT_S
 
 from pdcp import Client
 
@@ -13,7 +14,7 @@ from pdcp import Client
 class RawHost(Client):
     """Raw messages and those of Client go one after the other: what is raw is not matched to any request."""
 
-    def __init__(self, port: str, timeout_s: float = 4.0) -> None:
+    def __init__(self, port: str, timeout_s: float = LINE_TIMEOUT_S) -> None:
         self._line = SerialTransport(port)
         self._raw_timeout_s = timeout_s
         super().__init__(self._line, timeout_s=timeout_s)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "pdcp_time.h"
 #include "unity.h"
 
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
@@ -43,29 +44,35 @@ static void to_text(const can_frame_t *frame, char *text, size_t size)
     }
 }
 
+static void pass_first_time(exchange_t *x)
+{
+    exchange_tx(x, "100#0A");
+    exchange_wait(x, PDCP_CLOSED_MS);
+    exchange_tx(x, "100#0A");
+    exchange_silence(x);
+}
+
 void exchange_start(exchange_t *x, uint32_t now_ms)
 {
     /* Not in exchange_t: the RAM of a small machine does not hold it beside an application. */
     static pdcp_arb_t alone;
     memset(x, 0, sizeof *x);
-    x->now_ms = now_ms;
+    x->now_ms = now_ms - PDCP_CLOSED_MS;
     x->arb = &alone;
-    pdcp_arb_init(x->arb, now_ms, 250, on_event, x);
-    exchange_tx(x, "100#0A");
-    exchange_silence(x);
+    pdcp_arb_init(x->arb, x->now_ms, EXCHANGE_SERIAL, EXCHANGE_SEED, on_event, x);
+    pass_first_time(x);
 }
 
 void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings,
                         uint32_t now_ms)
 {
     memset(x, 0, sizeof *x);
-    x->now_ms = now_ms;
+    x->now_ms = now_ms - PDCP_CLOSED_MS;
     x->app = app;
     x->arb = &app->arb;
-    arb_app_init(app, port, settings, now_ms);
+    arb_app_init(app, port, settings, x->now_ms);
     arb_app_observe(app, on_event, x);
-    exchange_tx(x, "100#0A");
-    exchange_silence(x);
+    pass_first_time(x);
 }
 
 void exchange_step(exchange_t *x)
@@ -79,6 +86,17 @@ void exchange_step(exchange_t *x)
     }
 }
 
+/* Is a bind request held? */
+static bool is_held(const exchange_t *x)
+{
+    for (int i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (x->arb->bus.nodes.nodes[i].state == PDCP_NODE_ASKED) {
+            return true;
+        }
+    }
+    return false;
+}
+
 void exchange_rx(exchange_t *x, const char *text)
 {
     const can_frame_t frame = exchange_frame(text);
@@ -88,6 +106,9 @@ void exchange_rx(exchange_t *x, const char *text)
         (void)pdcp_arb_on_frame(x->arb, x->now_ms, &frame);
     }
     exchange_step(x);
+    if (pdcp_id_priority(frame.id) == PDCP_PRIORITY_BINDING && is_held(x)) {
+        exchange_pass(x, PDCP_HOLD_MS);
+    }
 }
 
 void exchange_tx(exchange_t *x, const char *text)
@@ -238,8 +259,38 @@ void exchange_add_input(exchange_t *x)
     exchange_rx(x, "012#0A");
 }
 
+void exchange_check_fails(exchange_t *x, const char *node_id)
+{
+    char question[16];
+    (void)snprintf(question, sizeof question, "3%s#03 01 00", node_id);
+    for (uint8_t tries = 0; tries < PDCP_CHECK_TRIES; tries++) {
+        exchange_tx(x, question);
+        exchange_pass(x, PDCP_ACK_MS);
+    }
+}
+
 void exchange_beacons(exchange_t *x)
 {
     exchange_rx(x, "011#0A");
     exchange_rx(x, "012#0A");
+}
+
+void exchange_meet_server(exchange_t *x)
+{
+    for (int i = 0; i < PDCP_STANDBY_BEACONS; i++) {
+        exchange_rx(x, "100#0A");
+    }
+}
+
+void exchange_meet_rival(exchange_t *x)
+{
+    const uint32_t until_ms = x->now_ms + PDCP_YIELD_MS + EXCHANGE_SERIAL;
+    while (pdcp_time_before(x->now_ms, until_ms)) {
+        exchange_rx(x, "100#0A");
+        exchange_rx(x, "345#03 0A 00"); /* a device of its own answers it */
+        exchange_rx(x, "245#83 01 0A 00 F401");
+        exchange_beacons(x);
+        exchange_pass(x, 500);
+    }
+    TEST_ASSERT_FALSE(x->arb->silent);
 }

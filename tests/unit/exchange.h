@@ -5,7 +5,11 @@
 
 #include "arb_app.h"
 
-enum { EXCHANGE_EVENTS = 48 };
+enum {
+    EXCHANGE_EVENTS = 48,
+    EXCHANGE_SERIAL = 256, /* the arbitrator's: no spread but of the standby, which ends after 1856 ms */
+    EXCHANGE_SEED = 253    /* the first output gets id FEh, the next ones count downwards (D-BUS-36) */
+};
 
 typedef struct {
     pdcp_arb_t *arb; /* the one that stands alone, of which a program has one, or the one of app */
@@ -15,7 +19,8 @@ typedef struct {
     int event_count;
 } exchange_t;
 
-/* A fresh arbitrator at now_ms, whose first beacon has left already. */
+/* An arbitrator that was started PDCP_CLOSED_MS before now_ms, so that outputs may be enabled (D-BUS-36). Its
+ * beacons have left already. */
 void exchange_start(exchange_t *x, uint32_t now_ms);
 
 /* The same with a whole application, whose port's can_send must refuse: its frames are taken from its queue.
@@ -28,7 +33,8 @@ void exchange_step(exchange_t *x);
 
 can_frame_t exchange_frame(const char *text);
 
-/* A frame from the bus, then a step. */
+/* A frame from the bus, then a step. While the arbitrator has no device of its own it holds bind requests
+ * (D-BUS-42): then time moves on by PDCP_HOLD_MS. */
 void exchange_rx(exchange_t *x, const char *text);
 
 /* The next frame that leaves must be this one. */
@@ -36,6 +42,14 @@ void exchange_tx(exchange_t *x, const char *text);
 
 /* No frame leaves. */
 void exchange_silence(exchange_t *x);
+
+/* Another arbitrator shows that it serves (D-BUS-42): an arbitrator without devices of its own goes on
+ * standby. */
+void exchange_meet_server(exchange_t *x);
+
+/* Another arbitrator is heard for so long that this one, which has the devices below, goes on standby with
+ * its next beacon (D-BUS-42). */
+void exchange_meet_rival(exchange_t *x);
 
 /* Takes and forgets whatever leaves; returns how many frames. */
 int exchange_drain(exchange_t *x);
@@ -70,6 +84,10 @@ void exchange_add_input(exchange_t *x);
 /* The link of that output to that input being made (pdcp-bus.md 8): 5, 6, 8, 7 and enabled to the input, then
  * enabled to the output. */
 extern const exchange_pair_t exchange_making[];
+
+/* The device with this node id (two hexadecimal digits) is asked who it is, in vain: the check of its
+ * identity (D-BUS-41). */
+void exchange_check_fails(exchange_t *x, const char *node_id);
 
 /* The beacon of these devices, so that they stay alive. */
 void exchange_beacons(exchange_t *x);

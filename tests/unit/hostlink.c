@@ -95,7 +95,8 @@ static const arb_port_t port = {.can_send = can_send,
 
 void hostlink_start(exchange_t *x, arb_app_t *app, bool strict)
 {
-    const arb_settings_t settings = {.strict_crc = strict, .no_autoconfig = true};
+    const arb_settings_t settings = {
+        .serial = EXCHANGE_SERIAL, .seed = EXCHANGE_SEED, .strict_crc = strict, .no_autoconfig = true};
     page_count = 0;
     memory_works = true;
     out_len = 0;

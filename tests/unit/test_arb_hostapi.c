@@ -269,10 +269,10 @@ static void test_passthrough_to_all(void)
     exchange_silence(&x);
 }
 
-/* D-BUS-12: an arbitrator on standby sends nothing. */
+/* D-BUS-42: an arbitrator on standby sends nothing. */
 static void test_passthrough_to_all_on_standby(void)
 {
-    exchange_rx(&x, "100#0A");
+    exchange_meet_server(&x);
     TEST_ASSERT_TRUE(x.arb->silent);
     ask(0x230A, BYTES(0, 0, 0, 0, 0, 0, 1, 9, 0, 0, 0, 0, 0, 0, 0));
     expect_error(0x230C, 0x0B);
@@ -431,6 +431,7 @@ static void test_a_reset_behind_a_long_transfer(void)
 static void test_a_reset_and_the_standby(void)
 {
     exchange_add_output(&x, "FE");
+    exchange_meet_rival(&x);
     ask(0x230D, BYTES(0));
     exchange_rx(&x, "100#0A");
     expect(0x230F, BYTES(0, 0, 0, 0, 0, 0, 0, 0));
@@ -487,6 +488,60 @@ static void test_sole_access(void)
     ask(0x2307, BYTES(DEV_OUT, 1, 2, 0, 2, 0, 7, 0, 1));
     exchange_tx(&x, "313#04 05 01 0200 0200");
     hostlink_silence();
+}
+
+/* The input of this device has a link to the output. */
+static void remember_link(uint8_t node, uint8_t status)
+{
+    channel(node)->link = status;
+    channel(node)->feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    channel(node)->source = x.arb->bus.nodes.nodes[0].identity;
+    channel(node)->source_index = 1;
+}
+
+/* D-API-13: an input that has the link already, inactive, does not get it while another one works. One that
+ * works may be asked for again, and of two that rest one may be made. */
+static void test_sole_access_of_a_link_that_rests(void)
+{
+    add_devices();
+    add_second_input();
+    remember_link(1, PDCP_LINK_INACTIVE);
+    remember_link(2, PDCP_LINK_ACTIVE);
+    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    expect_error(0x2309, 0x08);
+    ask(0x2307, BYTES(DEV_OUT, 1, 2, 0, 2, 0, 7, 0, 1));
+    expect(0x2308, BYTES(2));
+    exchange_silence(&x);
+    remember_link(2, PDCP_LINK_INACTIVE);
+    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    exchange_tx(&x, "312#04 05 01 0200 0200");
+    hostlink_silence();
+}
+
+/* D-API-13: what counts is how things are when the link is made: the other input's device asks for the output
+ * first (Update Data Channel), and gets it while the host's link waits. */
+static void test_sole_access_of_a_link_that_waits(void)
+{
+    static const exchange_pair_t asked_for[] = {
+        {"313#03 06 01", "213#83 01 06 01 0400 01"},
+        {"313#04 05 01 0200 0200", "213#84 01 05 01 0200 0200"},
+        {"313#04 06 01 0400 01", "213#84 01 06 01 0400 01"},
+        {"313#04 08 01 0050 2021", "213#84 01 08 01 0050 2021"},
+        {"313#04 07 01 11 FE", "213#84 01 07 01 11 FE"},
+        {"313#04 04 01 01", "213#84 01 04 01 01"},
+        {"311#04 04 01 01", "211#84 01 04 01 01"},
+        {"313#8F 01 01", NULL},
+        {NULL, NULL},
+    };
+    add_devices();
+    add_second_input();
+    exchange_rx(&x, "213#0F 01");
+    exchange_tx(&x, "313#03 05 01");
+    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    hostlink_silence();
+    exchange_rx(&x, "213#83 01 05 01 0200 0200");
+    exchange_run(&x, asked_for);
+    expect_error(0x2309, 0x08);
 }
 
 /* D-API-4, 09h: all node ids are given out, so that the device could not be set up. */
@@ -787,6 +842,8 @@ int main(void)
     RUN_TEST(test_a_reset_behind_a_long_transfer);
     RUN_TEST(test_a_reset_and_the_standby);
     RUN_TEST(test_sole_access);
+    RUN_TEST(test_sole_access_of_a_link_that_rests);
+    RUN_TEST(test_sole_access_of_a_link_that_waits);
     RUN_TEST(test_an_output_without_a_node_id);
     RUN_TEST(test_an_output_for_its_own_device);
     RUN_TEST(test_a_host_that_does_not_read_costs_no_time);

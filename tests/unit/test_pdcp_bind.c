@@ -69,10 +69,9 @@ static void test_a_suggested_id_is_reserved(void)
     exchange_tx(&x, "300#81 01 0100 0100 0100");
     exchange_rx(&x, "601#01 0200 0200 0200"); /* a stranger asks for it */
     exchange_tx(&x, "301#81 02 0200 0200 0200");
-    exchange_pass(&x, 999);
+    exchange_pass(&x, 989); /* and three requests are held for 5 ms (D-BUS-42) */
     exchange_rx(&x, "601#01 0300 0300 0300");
     exchange_tx(&x, "301#81 03 0300 0300 0300"); /* both are still reserved */
-    exchange_pass(&x, 1);
     exchange_rx(&x, "601#01 0300 0300 0300");
     exchange_tx(&x, "301#81 01 0300 0300 0300");
 }
@@ -91,15 +90,14 @@ static void test_asking_again_gets_the_same_suggestion(void)
 /* D-BUS-6: the same identity gets the id it had before, though it asks for another, also long after. */
 static void test_an_identity_keeps_its_id(void)
 {
-    exchange_rx(&x, "620#01 3412 7856 BC9A");
-    exchange_tx(&x, "320#81 20 3412 7856 BC9A");
-    exchange_pass(&x, 12000); /* lost, and forgotten */
+    exchange_add_output(&x, "FE"); /* remembered when it is set up (D-BUS-43) */
+    exchange_pass(&x, 12000);      /* lost, and forgotten */
     (void)exchange_drain(&x);
     TEST_ASSERT_EQUAL(PDCP_NODE_FREE, x.arb->bus.nodes.nodes[0].state);
-    exchange_rx(&x, "630#01 3412 7856 BC9A");
-    exchange_tx(&x, "330#81 20 3412 7856 BC9A");
-    exchange_rx(&x, "620#01 3412 7856 BC9A");
-    exchange_tx(&x, "320#81 20 3412 7856 BC9A");
+    exchange_rx(&x, "630#01 0200 0200 0400");
+    exchange_tx(&x, "330#81 11 0200 0200 0400");
+    exchange_rx(&x, "611#01 0200 0200 0400");
+    exchange_tx(&x, "311#81 11 0200 0200 0400");
 }
 
 /* D-BUS-6: an id remembered for an absent identity goes to another only when no unremembered one is left. */
@@ -142,11 +140,14 @@ static void test_the_oldest_identity_is_forgotten_first(void)
         const pdcp_remembered_t entry = {.identity = {1, 1, (uint16_t)(i + 1)}, .node_id = (uint8_t)(i + 1)};
         TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bus.bind, &entry));
     }
-    exchange_rx(&x, "6F0#01 0900 0900 0900");
-    exchange_tx(&x, "3F0#81 F0 0900 0900 0900");
+    for (unsigned i = 0; i < PDCP_IDENTITIES_MAX; i++) {
+        x.arb->bus.bind.remembered[i].node_id = (uint8_t)(i + 0x80); /* none that is asked for below */
+    }
+    exchange_add_output(&x, "FE");
     TEST_ASSERT_EQUAL(PDCP_IDENTITIES_MAX, x.arb->bus.bind.remembered_count);
-    TEST_ASSERT_EQUAL(0xF0, x.arb->bus.bind.remembered[0].node_id);
-    TEST_ASSERT_EQUAL(PDCP_IDENTITIES_MAX - 1, x.arb->bus.bind.remembered[PDCP_IDENTITIES_MAX - 1].node_id);
+    TEST_ASSERT_EQUAL(0x11, x.arb->bus.bind.remembered[0].node_id);
+    TEST_ASSERT_EQUAL(0x80 + PDCP_IDENTITIES_MAX - 2,
+                      x.arb->bus.bind.remembered[PDCP_IDENTITIES_MAX - 1].node_id);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_IDENTITIES));
 }
 
@@ -180,7 +181,95 @@ static void test_a_refused_device_keeps_its_reservation(void)
     exchange_tx(&x, "3C0#81 00 0900 0900 0900");
     pdcp_nodes_remove(&x.arb->bus.nodes, 31); /* it had 0x21 */
     exchange_rx(&x, "601#01 0200 0200 0200");
-    exchange_tx(&x, "301#81 22 0200 0200 0200");
+    exchange_tx(&x, "301#81 21 0200 0200 0200");
+}
+
+/* An identity asks for the id and, bound, is heard. */
+static void bind_and_beacon(unsigned id)
+{
+    char text[40];
+    (void)snprintf(text, sizeof text, "6%02X#01 0700 0700 %02X00", id, id);
+    exchange_rx(&x, text);
+    (void)snprintf(text, sizeof text, "0%02X#0A", id);
+    exchange_rx(&x, text);
+    (void)exchange_drain(&x);
+}
+
+/* D-BUS-43: identities that are not known hold at most three quarters of the places; who is remembered still
+ * finds one. */
+static void test_places_are_kept_for_known_identities(void)
+{
+    const pdcp_remembered_t known = {.identity = {1, 1, 1}, .node_id = 0x70};
+    TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bus.bind, &known));
+    exchange_pass(&x, 100); /* 600 ms after the start */
+    for (unsigned id = 1; id <= PDCP_UNKNOWN_PLACES; id++) {
+        bind_and_beacon(id);
+    }
+    exchange_rx(&x, "660#01 0900 0900 0900");
+    exchange_tx(&x, "360#81 00 0900 0900 0900");
+    exchange_rx(&x, "670#01 0100 0100 0100");
+    exchange_tx(&x, "370#81 70 0100 0100 0100");
+    TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_BIND_REFUSED));
+}
+
+/* D-BUS-43: a limb that powers up for the first time takes all places. */
+static void test_all_places_are_free_at_the_start(void)
+{
+    for (unsigned id = 1; id <= PDCP_DEVICES_MAX; id++) {
+        bind_and_beacon(id);
+    }
+    TEST_ASSERT_EQUAL(PDCP_DEVICES_MAX, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+}
+
+static bool knows_one(void *ctx, const pdcp_identity_t *identity)
+{
+    (void)ctx;
+    return identity->vid == 1 && identity->pid == 1 && identity->sn == 1;
+}
+
+/* D-BUS-43: so does a part of a stored configuration. */
+static void test_places_are_kept_for_stored_identities(void)
+{
+    pdcp_arb_know(x.arb, knows_one);
+    exchange_pass(&x, 100);
+    for (unsigned id = 1; id <= PDCP_UNKNOWN_PLACES; id++) {
+        bind_and_beacon(id);
+    }
+    exchange_rx(&x, "670#01 0100 0100 0100");
+    exchange_tx(&x, "370#81 70 0100 0100 0100");
+}
+
+/* D-BUS-43: an unknown identity that is not heard for 300 ms after its grant is forgotten at once; a known
+ * one is waited for as ever. */
+static void test_an_unknown_identity_that_is_not_there_is_forgotten(void)
+{
+    const pdcp_remembered_t known = {.identity = {1, 1, 1}, .node_id = 0x70};
+    TEST_ASSERT_TRUE(pdcp_bind_remember_stored(&x.arb->bus.bind, &known));
+    exchange_rx(&x, "670#01 0100 0100 0100");
+    exchange_tx(&x, "370#81 70 0100 0100 0100");
+    exchange_rx(&x, "620#01 3412 7856 BC9A");
+    (void)exchange_drain(&x);
+    exchange_pass(&x, 299);
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0x20]);
+    exchange_pass(&x, 1);
+    (void)exchange_drain(&x);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x20]);
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0x70]);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LOST));
+    exchange_silence(&x);
+}
+
+/* D-BUS-43: it is remembered when its setup has ended, not when it asks. */
+static void test_an_identity_is_remembered_when_it_is_set_up(void)
+{
+    exchange_rx(&x, "620#01 3412 7856 BC9A");
+    exchange_rx(&x, "020#0A");
+    TEST_ASSERT_EQUAL(0, x.arb->bus.bind.remembered_count);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_IDENTITIES));
+    (void)exchange_drain(&x);
+    exchange_add_output(&x, "FE");
+    TEST_ASSERT_EQUAL(1, x.arb->bus.bind.remembered_count);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_IDENTITIES));
 }
 
 static void test_without_a_node_id_it_is_refused(void)
@@ -205,12 +294,14 @@ static void test_a_second_device_with_the_same_identity_is_refused(void)
     TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
 }
 
-/* D-BUS-6: one try without an answer means that it was reset: granted again and set up afresh. */
+/* D-BUS-6, D-BUS-41: two tries without an answer mean that it was reset: granted again and set up afresh. */
 static void test_a_device_that_was_reset_is_granted_again(void)
 {
     exchange_add_output(&x, "FE");
     exchange_clear(&x);
     exchange_rx(&x, "611#01 0200 0200 0400");
+    exchange_tx(&x, "311#03 01 00");
+    exchange_pass(&x, 100);
     exchange_tx(&x, "311#03 01 00");
     exchange_pass(&x, 99);
     exchange_silence(&x);
@@ -228,9 +319,30 @@ static void test_a_device_that_was_reset_and_asks_for_another_id_gets_its_own_su
 {
     exchange_add_output(&x, "FE");
     exchange_rx(&x, "699#01 0200 0200 0400");
-    exchange_tx(&x, "311#03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "11");
     exchange_tx(&x, "399#81 11 0200 0200 0400");
+}
+
+/* D-BUS-41: any frame of priority 0 to 2 from the bound id shows that its owner is alive; one of its output
+ * does not. */
+static void test_any_frame_from_its_id_answers_for_a_device(void)
+{
+    static const char *const frames[] = {"011#0A", "211#0F 01", "411#55", "211#84 01 04 01"};
+    exchange_add_output(&x, "FE");
+    for (unsigned i = 0; i < sizeof frames / sizeof frames[0]; i++) {
+        exchange_rx(&x, "620#01 0200 0200 0400");
+        exchange_tx(&x, "311#03 01 00");
+        exchange_rx(&x, "0FE#11 22");
+        exchange_silence(&x);
+        exchange_rx(&x, frames[i]);
+        if (frames[i][4] == '0' && frames[i][5] == 'F') {
+            exchange_tx(&x, "311#8F 00 01"); /* by identifier */
+        }
+        exchange_tx(&x, "320#81 00 0200 0200 0400");
+        exchange_silence(&x);
+    }
+    TEST_ASSERT_EQUAL(4, stat_of(PDCP_STAT_BIND_DUPLICATE));
+    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
 }
 
 /* The grant was lost on the way: the device asks again while the arbitrator tries to set it up. */
@@ -276,10 +388,16 @@ int main(void)
     RUN_TEST(test_the_oldest_identity_is_forgotten_first);
     RUN_TEST(test_a_full_bus_refuses_with_id_0);
     RUN_TEST(test_a_refused_device_keeps_its_reservation);
+    RUN_TEST(test_places_are_kept_for_known_identities);
+    RUN_TEST(test_places_are_kept_for_stored_identities);
+    RUN_TEST(test_all_places_are_free_at_the_start);
+    RUN_TEST(test_an_unknown_identity_that_is_not_there_is_forgotten);
+    RUN_TEST(test_an_identity_is_remembered_when_it_is_set_up);
     RUN_TEST(test_without_a_node_id_it_is_refused);
     RUN_TEST(test_a_second_device_with_the_same_identity_is_refused);
     RUN_TEST(test_a_device_that_was_reset_is_granted_again);
     RUN_TEST(test_a_device_that_was_reset_and_asks_for_another_id_gets_its_own_suggested);
+    RUN_TEST(test_any_frame_from_its_id_answers_for_a_device);
     RUN_TEST(test_a_lost_grant_is_repeated);
     RUN_TEST(test_what_is_no_bind_request_is_counted);
     return UNITY_END();

@@ -276,6 +276,8 @@ static void test_an_identity_whose_id_is_in_use_gets_another(void)
     exchange_silence(&x);
     asks_for(1, 5);
     is_told(1, 1, 5);
+    TEST_ASSERT_EQUAL(0x20, x.arb->bus.bind.remembered[0].node_id); /* until it is set up (D-BUS-43) */
+    set_up(1, 5, "o", 0xFE);
     TEST_ASSERT_EQUAL(1, x.arb->bus.bind.remembered_count);
     TEST_ASSERT_EQUAL(1, x.arb->bus.bind.remembered[0].node_id);
 }
@@ -429,11 +431,11 @@ static void test_a_transfer_answers_for_its_device(void)
     exchange_silence(&x);
     from(0x11, "0E 00 000000000000");
     to(0x11, "8E 01");
-    exchange_silence(&x);
+    is_told(0x20, 0, 4);
     from(0x11, "0E 01 0000");
     to(0x11, "8E 01");
     to(0x11, "03 0A 01");
-    is_told(0x20, 0, 4);
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_BIND_DUPLICATE]);
     TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, x.arb->bus.nodes.nodes[0].state);
 }
@@ -631,15 +633,16 @@ static void test_what_is_for_all_needs_room_and_an_arbitrator_that_speaks(void)
     fill_queue();
     TEST_ASSERT_FALSE(pdcp_arb_broadcast(x.arb, PDCP_SUSPEND, 0));
     (void)exchange_drain(&x);
-    exchange_rx(&x, "100#0A");
+    exchange_meet_server(&x);
     TEST_ASSERT_FALSE(pdcp_arb_broadcast(x.arb, PDCP_SUSPEND, 0));
     exchange_silence(&x);
 }
 
-/* D-BUS-12: a link that a device has asked for is nothing that the host waits for. */
+/* D-BUS-42: a link that a device has asked for is nothing that the host waits for. */
 static void test_going_silent_ends_a_devices_link_without_a_word(void)
 {
     add_two();
+    exchange_meet_rival(&x);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
     exchange_rx(&x, "100#0A");
@@ -651,6 +654,7 @@ static void test_going_silent_ends_a_devices_link_without_a_word(void)
 static void test_going_silent_ends_a_wish_that_has_not_begun(void)
 {
     add_two();
+    exchange_meet_rival(&x);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
     wish(0, 1);
@@ -734,8 +738,7 @@ static void test_no_link_with_a_device_in_its_setup(void)
     add_two();
     add(0x13, 9, "i", 0);
     asks_for(0x12, 6);
-    to(0x12, "03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "12");
     is_told(0x12, 0x12, 6);
     to(0x12, "03 01 00");
     wish(0, 1);
@@ -747,6 +750,11 @@ static void test_no_link_with_a_device_in_its_setup(void)
     from(0x12, "83 01 01 00 0200 0200");
     to(0x12, "03 02 00");
     exchange_pass(&x, 1);
+    to(0x11, "03 01 00");
+    exchange_pass(&x, 98);
+    from(0x12, "83 01 02 00 0600");
+    to(0x12, "03 06 00");
+    exchange_pass(&x, 2);
     is_told(0x11, 0x11, 4);
     to(0x11, "03 01 00");
     wish(0, 2);
@@ -1044,7 +1052,7 @@ static void test_a_source_that_comes_back_as_an_input(void)
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, channel(1, 1)->link);
     TEST_ASSERT_EQUAL(PDCP_INPUT, channel(0, 1)->transfer);
-    add(0x13, 9, "o", 0xFE);
+    add(0x13, 9, "o", 0xFD); /* a freed id is given out last (D-BUS-36) */
     exchange_silence(&x);
 }
 
@@ -1105,8 +1113,7 @@ static void test_a_link_outlives_a_failed_setup(void)
     exchange_silence(&x);
     beacon(0x11);
     asks_for(0x12, 6);
-    to(0x12, "03 01 00");
-    exchange_pass(&x, 100);
+    exchange_check_fails(&x, "12");
     is_told(0x12, 0x12, 6);
     set_up(0x12, 6, "i", 0);
     link_input(0x12, 4, 0x11, 0xFE);

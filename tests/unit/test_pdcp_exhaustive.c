@@ -89,6 +89,7 @@ static void fill_bus(void)
     input->link = PDCP_LINK_ACTIVE;
     input->feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
     input->enabled = true;
+    x.arb->bus.nodes.channels[input->feed].enabled = true; /* else a stranger would take its id (D-BUS-36) */
     exchange_rx(&x, "613#01 0300 0300 0300");
     exchange_rx(&x, "013#0A");
     exchange_rx(&x, "614#01 0400 0400 0400");
@@ -126,7 +127,7 @@ static void test_every_frame_is_classified_and_changes_nothing(void)
 /* The same while the arbitrator is on standby: nothing but beacons of the other is even looked at. */
 static void test_on_standby_every_frame_is_classified(void)
 {
-    exchange_rx(&x, "100#0A");
+    exchange_meet_server(&x);
     before = tables();
     for (uint16_t id = 0; id <= CAN_FRAME_ID_MAX; id = (uint16_t)(id + ID_STEP)) {
         for (uint16_t code = 0; code < 16; code++) {
@@ -162,9 +163,14 @@ static void enter_state(pdcp_request_state_t state)
         break;
     case PDCP_REQUEST_SET_SIZE:
     case PDCP_REQUEST_SET_DATA:
+    case PDCP_REQUEST_SET_ECHO:
         pdcp_request_set(bus, 0, PDCP_CLIENT_NONE, 0, 7, long_value, 10);
-        if (state == PDCP_REQUEST_SET_DATA) {
+        if (state != PDCP_REQUEST_SET_SIZE) {
             exchange_rx(&x, "211#8D 01 07 00 0A00");
+        }
+        if (state == PDCP_REQUEST_SET_ECHO) {
+            exchange_wait(&x, 100); /* the packet is sent once more */
+            exchange_rx(&x, "211#8E 01");
         }
         break;
     case PDCP_REQUEST_RAW:
@@ -184,33 +190,34 @@ static void enter_state(pdcp_request_state_t state)
 #define GDAT PDCP_REQUEST_GET_DATA
 #define SSIZ PDCP_REQUEST_SET_SIZE
 #define SDAT PDCP_REQUEST_SET_DATA
+#define ECHO PDCP_REQUEST_SET_ECHO
 #define RAW PDCP_REQUEST_RAW
 
 static const struct {
     const char *event; /* a frame; NULL: the deadline of the last try */
     uint8_t next[PDCP_REQUEST_STATES];
 } machine[] = {
-    /*                              idle  answer gsize gdata ssize sdata raw */
-    {"211#83 01 07 00 01020304", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT, IDLE}},
-    {"211#83 00 07 00", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT, IDLE}},
-    {"211#83 02 07 00", {IDLE, GSIZ, GSIZ, GDAT, SSIZ, SDAT, IDLE}},
-    {"211#83 01 08 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#84 01 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#84 02 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#88 01 0000", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#89 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8B 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8C 01 07 00 0A00", {IDLE, ANSW, GDAT, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8C 01 07 00 0000", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8C 01 07 00 1100", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8C 00 07 00 0A00", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8D 01 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, SDAT, SDAT, RAW}},
-    {"211#8D 00 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, IDLE, SDAT, RAW}},
-    {"211#0E 00 010203040506", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#0E 05 010203040506", {IDLE, ANSW, GSIZ, GSIZ, SSIZ, SDAT, RAW}},
-    {"211#8E 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, RAW}},
-    {"211#8E 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SSIZ, RAW}},
-    {NULL, {IDLE, IDLE, IDLE, GSIZ, IDLE, IDLE, IDLE}},
+    /*                              idle  answer gsize gdata ssize sdata echo raw */
+    {"211#83 01 07 00 01020304", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT, ECHO, IDLE}},
+    {"211#83 00 07 00", {IDLE, IDLE, GSIZ, GDAT, SSIZ, SDAT, ECHO, IDLE}},
+    {"211#83 02 07 00", {IDLE, GSIZ, GSIZ, GDAT, SSIZ, SDAT, ECHO, IDLE}},
+    {"211#83 01 08 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#84 01 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#84 02 07 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#88 01 0000", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#89 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8B 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8C 01 07 00 0A00", {IDLE, ANSW, GDAT, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8C 01 07 00 0000", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8C 01 07 00 1100", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8C 00 07 00 0A00", {IDLE, ANSW, IDLE, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8D 01 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, SDAT, SDAT, ECHO, RAW}},
+    {"211#8D 00 07 00 0A00", {IDLE, ANSW, GSIZ, GDAT, IDLE, SDAT, ECHO, RAW}},
+    {"211#0E 00 010203040506", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, ECHO, RAW}},
+    {"211#0E 05 010203040506", {IDLE, ANSW, GSIZ, GSIZ, SSIZ, SDAT, ECHO, RAW}},
+    {"211#8E 01", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SDAT, SDAT, RAW}},
+    {"211#8E 00", {IDLE, ANSW, GSIZ, GDAT, SSIZ, SSIZ, SSIZ, RAW}},
+    {NULL, {IDLE, IDLE, IDLE, GSIZ, IDLE, IDLE, SDAT, IDLE}},
 };
 
 static void test_the_request_machine_over_all_states_and_events(void)

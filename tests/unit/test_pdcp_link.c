@@ -306,6 +306,15 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
         {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
         {NULL, NULL},
     };
+    static const exchange_pair_t making_again[] = {
+        {"312#04 05 01 0200 0200", "212#84 01 05 01"},
+        {"312#04 06 01 0400 01", "212#84 01 06 01"},
+        {"312#04 08 01 0050 2021", "212#84 01 08 01"},
+        {"312#04 07 01 11 FD", "212#84 01 07 01"},
+        {"312#04 04 01 01", "212#84 01 04 01"},
+        {"311#04 04 01 01", "211#84 01 04 01"},
+        {NULL, NULL},
+    };
     make_link();
     for (int i = 0; i < 24; i++) {
         exchange_pass(&x, 500);
@@ -318,8 +327,8 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
     TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
     TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->feed);
-    exchange_add_output(&x, "FE");
-    exchange_run(&x, making);
+    exchange_add_output(&x, "FD"); /* a freed id is given out last (D-BUS-36) */
+    exchange_run(&x, making_again);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
 }
 
@@ -479,6 +488,101 @@ static void test_a_link_waits_for_the_hosts_request(void)
     exchange_run(&x, making);
 }
 
+/* Device 0003:0003:0009 as id 13h: one input, index 1, linked to the same output, which is on already. */
+static void link_second_input(void)
+{
+    static const exchange_pair_t binding[] = {
+        {"313#81 13 0300 0300 0900", NULL},
+        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
+        {"313#03 02 00", "213#83 01 02 00 0900"},
+        {"313#03 06 00", "213#83 00 06 00"},
+        {"313#03 0B 00", "213#83 00 0B 00"},
+        {"313#03 0A 00", "213#83 00 0A 00"},
+        {"313#03 09 00", "213#83 01 09 00 01"},
+        {"313#04 04 01 00", "213#84 01 04 01 00"},
+        {"313#03 03 01", "213#83 01 03 01 01"},
+        {"313#03 01 01", "213#83 01 01 01 0053 1011"},
+        {"313#03 05 01", "213#83 00 05 01"},
+        {"313#03 06 01", "213#83 00 06 01"},
+        {"313#03 08 01", "213#83 00 08 01"},
+        {"313#03 09 01", "213#83 00 09 01"},
+        {"313#03 0A 01", "213#83 00 0A 01"},
+        {"313#03 0B 01", "213#83 00 0B 01"},
+        {NULL, NULL},
+    };
+    static const exchange_pair_t linking[] = {
+        {"313#04 05 01 0200 0200", "213#84 01 05 01 0200 0200"},
+        {"313#04 06 01 0400 01", "213#84 01 06 01 0400 01"},
+        {"313#04 08 01 0050 2021", "213#84 01 08 01 0050 2021"},
+        {"313#04 07 01 11 FE", "213#84 01 07 01 11 FE"},
+        {"313#04 04 01 01", "213#84 01 04 01 01"},
+        {NULL, NULL},
+    };
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_run(&x, binding);
+    exchange_rx(&x, "013#0A");
+    TEST_ASSERT_EQUAL(PDCP_OK,
+                      pdcp_arb_connect(x.arb, output(), pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)));
+    exchange_run(&x, linking);
+}
+
+/* Both inputs have lost their source; the first of them is being silenced. */
+static void lose_source_of_both(void)
+{
+    make_link();
+    link_second_input();
+    exchange_pass(&x, 1000);
+    exchange_rx(&x, "012#0A");
+    exchange_rx(&x, "013#0A");
+    exchange_pass(&x, 500);
+    exchange_tx(&x, "312#04 04 01 00");
+    exchange_silence(&x);
+}
+
+/* An Update Data Channel that comes while its input still is to be silenced does not take the place of that,
+ * least of all when links are stored, and it changes nothing (profile-layer.md 4). */
+static void test_update_data_channel_does_not_keep_an_input_from_being_silenced(void)
+{
+    static const exchange_pair_t silencing[] = {
+        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
+        {"313#04 04 01 00", "213#84 01 04 01 00"},
+        {"313#04 07 01 00 00", "213#84 01 07 01 00 00"},
+        {"313#8F 00 01", NULL},
+        {NULL, NULL},
+    };
+    lose_source_of_both();
+    pdcp_arb_plan_links(x.arb, true);
+    exchange_rx(&x, "213#0F 01");
+    exchange_silence(&x);
+    exchange_rx(&x, "212#84 01 04 01 00");
+    exchange_run(&x, silencing);
+    TEST_ASSERT_FALSE(x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)].enabled);
+}
+
+/* D-BUS-22: nor does it when the input does not answer: what breaks off the repetition is served, and then it
+ * is told again. */
+static void test_update_data_channel_does_not_end_the_silencing(void)
+{
+    make_link();
+    pdcp_arb_plan_links(x.arb, true);
+    exchange_pass(&x, 1000);
+    exchange_rx(&x, "012#0A");
+    exchange_pass(&x, 500);
+    for (int i = 0; i < 4; i++) { /* three tries, and one of those that anything else breaks off */
+        exchange_tx(&x, "312#04 04 01 00");
+        exchange_silence(&x);
+        exchange_pass(&x, i < 3 ? 100 : 50);
+    }
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#8F 00 01");
+    exchange_tx(&x, "312#04 04 01 00");
+    exchange_rx(&x, "212#84 01 04 01 00");
+    exchange_tx(&x, "312#04 07 01 00 00");
+    exchange_rx(&x, "212#84 01 07 01 00 00");
+    exchange_silence(&x);
+    TEST_ASSERT_FALSE(the_input()->enabled);
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -506,5 +610,7 @@ int main(void)
     RUN_TEST(test_a_source_is_replaced);
     RUN_TEST(test_a_source_lost_in_the_middle_is_undone);
     RUN_TEST(test_a_link_waits_for_the_hosts_request);
+    RUN_TEST(test_update_data_channel_does_not_keep_an_input_from_being_silenced);
+    RUN_TEST(test_update_data_channel_does_not_end_the_silencing);
     return UNITY_END();
 }

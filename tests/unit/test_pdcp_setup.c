@@ -404,19 +404,42 @@ static void test_a_beacon_interval_written_by_the_host_counts(void)
 static void test_channel_data_counts_as_life(void)
 {
     exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1),
+                                                pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)));
+    exchange_run(&x, exchange_making);
     for (int i = 0; i < 4; i++) {
         exchange_pass(&x, 1000);
         exchange_rx(&x, "0FE#55");
+        exchange_rx(&x, "012#0A");
     }
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LOST));
     TEST_ASSERT_EQUAL(4, stat_of(PDCP_STAT_CHANNEL_DATA));
+}
+
+/* D-BUS-36: on the id of an output that is not enabled speaks a stranger, 100 ms after its disabling was
+ * answered: that is no life of the owner. */
+static void test_data_of_an_output_that_is_silent_is_a_strangers(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_pass(&x, 99);
+    exchange_rx(&x, "0FE#55");
+    TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_CHANNEL_DATA));
+    exchange_pass(&x, 1);
+    for (int i = 0; i < 4; i++) {
+        exchange_rx(&x, "0FE#55");
+        exchange_pass(&x, 400);
+    }
+    TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_CHANNEL_DATA));
+    TEST_ASSERT_EQUAL(4, stat_of(PDCP_STAT_DROP_UNKNOWN_ID));
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LOST));
 }
 
 /* D-BUS-15: a beacon from an id that is not bound gets Reset Device, at most once a second, not in the first
  * 1200 ms. */
 static void test_a_stranger_is_told_to_reset(void)
 {
-    exchange_pass(&x, 1199);
+    exchange_pass(&x, 1199 - PDCP_CLOSED_MS);
     exchange_rx(&x, "042#0A");
     exchange_silence(&x);
     exchange_pass(&x, 1);
@@ -505,6 +528,7 @@ int main(void)
     RUN_TEST(test_a_short_beacon_interval_counts_at_once);
     RUN_TEST(test_a_beacon_interval_written_by_the_host_counts);
     RUN_TEST(test_channel_data_counts_as_life);
+    RUN_TEST(test_data_of_an_output_that_is_silent_is_a_strangers);
     RUN_TEST(test_a_stranger_is_told_to_reset);
     RUN_TEST(test_a_lost_device_that_beacons_is_taken_back);
     RUN_TEST(test_the_arbitrator_beacons_every_500_ms);

@@ -1,6 +1,6 @@
-/* Two arbitrators, commands to devices, a bus that fails (pdcp-bus.md 9): D-BUS-12, D-BUS-15, D-BUS-22,
- * D-BUS-23, D-BUS-26, with hand-written frames. The serial number of the arbitrator under test is 250: its
- * standby ends 2250 ms after the last foreign beacon. */
+/* Two arbitrators, commands to devices, a bus that fails (pdcp-bus.md 9): D-BUS-15, D-BUS-22, D-BUS-23,
+ * D-BUS-26, D-BUS-42, with hand-written frames. The serial number of the arbitrator under test is 256: its
+ * standby ends 1856 ms after the last foreign beacon. */
 #include "exchange.h"
 #include "unity.h"
 
@@ -18,11 +18,11 @@ static uint32_t stat_of(pdcp_stat_t stat)
     return x.arb->bus.stats[stat];
 }
 
-/* D-BUS-12: heard within 1200 ms of the own start. */
-static void test_a_second_arbitrator_goes_silent(void)
+/* D-BUS-42: without devices of its own, at any age. */
+static void test_an_arbitrator_without_devices_goes_on_standby(void)
 {
-    exchange_pass(&x, 1199);
-    exchange_rx(&x, "100#0A");
+    exchange_pass(&x, 5000);
+    exchange_meet_server(&x);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SILENT));
     exchange_rx(&x, "611#01 0200 0200 0400"); /* nobody is granted anything */
     exchange_rx(&x, "042#0A");
@@ -36,12 +36,56 @@ static void test_a_second_arbitrator_goes_silent(void)
     TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_get(x.arb, 0, 0, 1, NULL, 0));
 }
 
-/* Silence of the other for 2 s and the spread by serial number: it starts afresh, and keeps quiet towards
- * strangers for another 1200 ms. */
+/* D-BUS-42: one whose beacons have not left for 1600 ms, because it was hung or off the bus, sends nothing
+ * for 600 ms. It goes on if nobody else serves by then. */
+static void test_a_hung_arbitrator_listens_first(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_wait(&x, 1600 - PDCP_HOLD_MS); /* nothing leaves in a wait */
+    exchange_tx(&x, "100#0A");
+    exchange_drain(&x);
+    exchange_wait(&x, 1601);
+    exchange_silence(&x);
+    TEST_ASSERT_TRUE(pdcp_arb_broadcast(x.arb, PDCP_RELEASE, 0));
+    exchange_wait(&x, 599);
+    exchange_silence(&x);
+    exchange_wait(&x, 1);
+    exchange_tx(&x, "100#0A");
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_SILENT));
+}
+
+/* Somebody has taken over meanwhile. */
+static void test_a_hung_arbitrator_gives_way_to_one_that_serves(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_wait(&x, 1601);
+    exchange_rx(&x, "100#0A");
+    exchange_rx(&x, "311#03 09 00");
+    exchange_rx(&x, "211#83 01 09 00 01");
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_SILENT));
+    exchange_wait(&x, 600);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SILENT));
+    exchange_silence(&x);
+}
+
+/* The same, and the one that serves asks no more than who is there. */
+static void test_a_question_for_an_identity_is_no_service(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_wait(&x, 1601);
+    exchange_rx(&x, "100#0A");
+    exchange_rx(&x, "311#03 01 00");
+    exchange_rx(&x, "211#83 01 01 00 0200 0200");
+    exchange_wait(&x, 600);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_SILENT));
+}
+
+/* D-BUS-35: silence of the other for 1600 ms and the spread by serial number: it takes over, and keeps quiet
+ * towards strangers for 1200 ms. */
 static void test_the_standby_takes_over(void)
 {
-    exchange_rx(&x, "100#0A");
-    exchange_wait(&x, 2249);
+    exchange_meet_server(&x);
+    exchange_wait(&x, 1855);
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_STARTED));
     exchange_wait(&x, 1);
@@ -55,10 +99,10 @@ static void test_the_standby_takes_over(void)
     exchange_add_input(&x);
 }
 
-/* Heard later, this one was there first: it stays and reports, once. */
+/* D-BUS-42: with devices of its own it stays and reports, once. */
 static void test_the_first_arbitrator_stays(void)
 {
-    exchange_pass(&x, 1200);
+    exchange_add_output(&x, "FE");
     exchange_rx(&x, "100#0A");
     exchange_pass(&x, 500);
     exchange_rx(&x, "100#0A");
@@ -76,6 +120,7 @@ static void test_going_silent_ends_what_the_host_waits_for(void)
     uint8_t bytes[8];
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
+    exchange_meet_rival(&x);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_get(x.arb, 0, 0, 8, bytes, sizeof bytes));
     exchange_tx(&x, "311#03 08 00");
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1),
@@ -269,8 +314,8 @@ static void test_what_waits_without_a_bus_is_discarded(void) /* D-BUS-28 */
 /* The end of a standby, where all that is known of the bus is forgotten, is no reason to stay off it. */
 static void test_bus_off_is_left_over_the_end_of_a_standby(void)
 {
-    exchange_rx(&x, "100#0A");
-    exchange_wait(&x, 2200);
+    exchange_meet_server(&x);
+    exchange_wait(&x, 1806);
     pdcp_arb_on_state(x.arb, x.now_ms, PDCP_BUS_OFF);
     exchange_wait(&x, 50);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_STARTED));
@@ -304,7 +349,10 @@ static void test_a_full_queue_delays_nothing_urgent(void)
 int main(void)
 {
     UNITY_BEGIN();
-    RUN_TEST(test_a_second_arbitrator_goes_silent);
+    RUN_TEST(test_an_arbitrator_without_devices_goes_on_standby);
+    RUN_TEST(test_a_hung_arbitrator_listens_first);
+    RUN_TEST(test_a_hung_arbitrator_gives_way_to_one_that_serves);
+    RUN_TEST(test_a_question_for_an_identity_is_no_service);
     RUN_TEST(test_the_standby_takes_over);
     RUN_TEST(test_the_first_arbitrator_stays);
     RUN_TEST(test_going_silent_ends_what_the_host_waits_for);

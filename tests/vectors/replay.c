@@ -13,7 +13,9 @@
 #define CLOCK_MS 0xFFFFF000uL /* the arbitrator's clock at the log's 0: it wraps after four seconds */
 
 enum {
-    SERIAL = 250, /* of the arbitrator: its standby ends after 2250 ms (D-BUS-12) */
+    SEED = 253,   /* the first output gets id 254, the next ones count downwards (D-BUS-36) */
+    SERIAL = 256, /* of the arbitrator: bind requests are held for 5 ms, its standby ends after 1856 ms
+                     (D-BUS-42) */
     LINE_SIZE = 256,
     WORDS_MAX = 5,
     OUTCOMES_MAX = 8,
@@ -362,6 +364,19 @@ static void do_full_bus(replay_t *replay, char *words[], size_t count)
     }
 }
 
+/* A device that says nothing and is not lost. */
+static void do_in_service(replay_t *replay, char *words[], size_t count)
+{
+    static const pdcp_identity_t identity = {0xF000, 0xF000, 0xF000};
+    pdcp_nodes_t *nodes = &replay->arb.bus.nodes;
+    (void)words;
+    (void)count;
+    if (nodes->nodes[PDCP_DEVICES_MAX - 1].state == PDCP_NODE_FREE) {
+        pdcp_nodes_add(nodes, PDCP_DEVICES_MAX - 1, &identity, 0xC8);
+        nodes->nodes[PDCP_DEVICES_MAX - 1].state = PDCP_NODE_READY;
+    }
+}
+
 static void do_hide_beacons(replay_t *replay, char *words[], size_t count)
 {
     (void)words;
@@ -434,7 +449,7 @@ static const action_t actions[] = {
     {"link", 3, 0, true, do_link},         {"unlink", 2, 0, true, do_unlink},
     {"suspend", 3, 0, true, do_suspend},   {"release", 2, 0, true, do_release},
     {"reset", 2, 0, true, do_reset},       {"remember", 3, 0, true, do_remember},
-    {"full-bus", 1, 0, true, do_full_bus},
+    {"full-bus", 1, 0, true, do_full_bus}, {"in-service", 1, 0, false, do_in_service},
 };
 
 /* Lines */
@@ -536,7 +551,7 @@ int main(int argc, char **argv)
         (void)fputs("usage: replay LOG\n", stderr);
         return 2;
     }
-    pdcp_arb_init(&replay.arb, clock_ms(&replay), SERIAL, on_event, &replay);
+    pdcp_arb_init(&replay.arb, clock_ms(&replay), SERIAL, SEED, on_event, &replay);
     step(&replay);
     play(&replay, argv[1]);
     expect_nothing(&replay);

@@ -53,6 +53,7 @@ def replay(path: Path, text: str) -> tuple[int, str]:
 
 
 GOOD = """\
+#! in-service
 (0.000000) can0 100#0A T
 #! remember 1234:5678:9ABC 20
 (0.010000) can0 620#0134127856BC9A R

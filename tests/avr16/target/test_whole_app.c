@@ -92,7 +92,7 @@ static void expect(uint16_t id, const uint8_t *data, uint8_t dlc)
 
 void setUp(void)
 {
-    static const arb_settings_t settings = {.strict_crc = true};
+    static const arb_settings_t settings = {.seed = 253, .strict_crc = true};
     now_ms = 0xFFFFFF00u;
     sent_count = 0;
     answer_len = 0;

@@ -1,0 +1,50 @@
+/* Node ids without an owner: when a frame was heard on each, and which of them were told to reset.
+ *
+ * An id on which somebody may still speak is not given away (D-BUS-36), and every unknown id is served on its
+ * own, at most once a second (D-BUS-15, D-BUS-37). Time is kept in ticks of 100 ms. Plain data: nothing is
+ * sent here. */
+#ifndef PDCP_UNKNOWN_H
+#define PDCP_UNKNOWN_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+enum {
+    PDCP_UNKNOWN_TICK_MS = 100,
+    PDCP_UNKNOWN_QUIET = 120,     /* ticks, 12 s: an id that was silent for so long is quiet */
+    PDCP_UNKNOWN_RESET_PAUSE = 10 /* ticks, 1 s: between two Resets to the same id (D-BUS-15) */
+};
+
+typedef struct {
+    uint32_t tick_ms;          /* when the tick under way began */
+    uint8_t tick;              /* its number, 1 to 255, then 1 again */
+    uint8_t swept;             /* tick of the last sweep */
+    uint8_t heard[256];        /* by node id: tick of the last frame, or of the last Reset; 0: quiet */
+    uint8_t answered[256 / 8]; /* by node id: whoever was told has answered, and was not heard since */
+    uint8_t told[256 / 8];     /* by node id: heard[] is the tick of a Reset, less than a second ago */
+} pdcp_unknown_t;
+
+/* All ids are quiet. */
+void pdcp_unknown_init(pdcp_unknown_t *unknown, uint32_t now_ms);
+
+/* Lets time pass; to be called every few days at least. */
+void pdcp_unknown_on_time(pdcp_unknown_t *unknown, uint32_t now_ms);
+
+/* A frame came from this id, or its owner was just forgotten. */
+void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
+
+/* An answer to Reset Device came from this id. If the id was told to reset, its speaker is silent from now
+ * on. */
+void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
+
+/* May the id be told to reset now? If so, it counts as told. */
+bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
+
+/* Was a frame heard on any id lately? */
+bool pdcp_unknown_any(const pdcp_unknown_t *unknown);
+
+/* Ticks since a frame was heard on this id, as of the last of the calls above; PDCP_UNKNOWN_QUIET: it is
+ * quiet. */
+uint8_t pdcp_unknown_silence(const pdcp_unknown_t *unknown, uint8_t id);
+
+#endif

@@ -83,11 +83,29 @@ void life_forge_reset(life_forger_t *forger)
     }
 }
 
+/* Does a part have this id, or does one of its outputs, or does an input listen to it? */
+static bool is_in_use(const life_forger_t *forger, uint8_t id)
+{
+    for (int part = 0; part < forger->limb->count; part++) {
+        const limb_part_t *each = &forger->limb->parts[part];
+        for (uint8_t i = 1; each->node != NULL && i <= each->ini->desc.channel_count; i++) {
+            const pdcp_device_channel_t *channel = pdcp_device_channel(device_of(forger, part), i);
+            if (channel->node_id == id || channel->source_channel == id) {
+                return true;
+            }
+        }
+        if (each->node != NULL && pdcp_device_node_id(device_of(forger, part)) == id) {
+            return true;
+        }
+    }
+    return false;
+}
+
 void life_forge_unknown(life_forger_t *forger)
 {
     static const uint8_t data[] = {PDCP_BEACON};
     const uint8_t id = (uint8_t)(PDCP_NODE_MIN + chance(forger, PDCP_NODE_MAX));
-    if (forger->limb->world.app != NULL && forger->limb->app.arb.bus.nodes.owner[id] == 0) {
+    if (!is_in_use(forger, id)) {
         send(forger, pdcp_can_id(PDCP_PRIORITY_HIGH, false, id), data, sizeof data);
     }
 }

@@ -7,13 +7,13 @@ static struct {
     bool holds; /* lives hold with it: it belongs to every run of the tests */
     bool on;
 } switches[LIFE_SWITCHES] = {
-    [LIFE_VALUES] = {"values", false, false},      /* D-BUS-36 */
-    [LIFE_FLAGS] = {"flags", false, false},        /* D-BUS-40 */
-    [LIFE_TWINS] = {"twins", false, false},        /* D-BUS-41 */
+    [LIFE_VALUES] = {"values", true, false},
+    [LIFE_FLAGS] = {"flags", false, false}, /* D-BUS-40 */
+    [LIFE_TWINS] = {"twins", true, false},
     [LIFE_CLONES_COME] = {"clones", false, false}, /* D-BUS-40: what a twin leaves behind */
     [LIFE_LOOSE_PLUGS] = {"loose", true, false},
     [LIFE_LOST_FRAMES] = {"lost", true, false},
-    [LIFE_RESTARTS] = {"restarts", true, false},
+    [LIFE_RESTARTS] = {"restarts", false, false},       /* with loose plugs: two get one id */
     [LIFE_FORGED_FLAGS] = {"enabled", false, false},    /* D-BUS-40 */
     [LIFE_FORGED_SOURCES] = {"source", false, false},   /* D-BUS-40 */
     [LIFE_FORGED_SUSPENDS] = {"suspend", false, false}, /* D-BUS-40 */

@@ -24,6 +24,30 @@ static inline bool life_chance(life_random_t *random, uint32_t percent)
     return life_random(random, 100) < percent;
 }
 
+/* --- What is looked for and what happens, one by one (life_switches.c) --- */
+
+enum {
+    LIFE_VALUES,
+    LIFE_FLAGS,
+    LIFE_TWINS,
+    LIFE_CLONES_COME,
+    LIFE_LOOSE_PLUGS,
+    LIFE_LOST_FRAMES,
+    LIFE_RESTARTS,
+    LIFE_FORGED_FLAGS, /* and what follows: somebody else's frames */
+    LIFE_FORGED_SOURCES,
+    LIFE_FORGED_SUSPENDS,
+    LIFE_FORGED_RESETS,
+    LIFE_UNKNOWN_BEACONS,
+    LIFE_FOREIGN_BEACONS,
+    LIFE_SWITCHES
+};
+
+/* Switches on what is listed, NAME,NAME, and the rest off: "held" is all that lives hold with, "all" is all.
+ * With nothing on, a life is what it was before there were switches, seed by seed. */
+void life_switch_on(const char *list);
+bool life_is_on(int number);
+
 /* --- The host: asks at random, and checks what it is answered (life_host.c) --- */
 
 enum { LIFE_OPEN_MAX = 16, LIFE_STRING_MAX = 8192, LIFE_PIECE_MAX = 512, LIFE_BYTES_MAX = 16384 };
@@ -175,6 +199,25 @@ void life_watch_calm_down(life_watch_t *watch, uint32_t now_ms);
 
 /* When all has been calm: nobody is suspended but by the host. */
 void life_watch_calm(const life_watch_t *watch);
+
+/* --- Frames of somebody else, most of them in the arbitrator's name (life_forge.c) --- */
+
+typedef struct {
+    limb_t *limb;
+    life_random_t *random;
+    life_watch_t *watch; /* is told what it must not expect */
+    int port;            /* of the bus */
+} life_forger_t;
+
+/* Each to a random part, if it is plugged in. */
+void life_forge_flag(life_forger_t *forger);                    /* transfer enabled = 0 */
+void life_forge_source(life_forger_t *forger, uint32_t now_ms); /* parameter 7 */
+void life_forge_suspend(life_forger_t *forger);
+void life_forge_reset(life_forger_t *forger);
+
+/* Beacons: of a device that nobody knows, and of another arbitrator. */
+void life_forge_unknown(life_forger_t *forger);
+void life_forge_arbitrator(life_forger_t *forger);
 
 /* --- Invariants (life_check.c) --- */
 

@@ -189,12 +189,8 @@ static void on_taken(void *ctx, int part, uint8_t input)
     life_watch_t *watch = ctx;
     const sim_bus_t *bus = &watch->limb->world.bus;
     const int sender = limb_part_at(watch->limb, bus->delivering);
-    if (!watch->values || watch->forged_ms[part][input] > watch->now_ms) {
-        return;
-    }
-    if (sender < 0) {
-        complain(part, input, "takes values of nobody");
-        return;
+    if (!watch->values || watch->forged_ms[part][input] > watch->now_ms || sender < 0) {
+        return; /* frames of others than parts are forged */
     }
     const uint8_t output = output_with(watch, sender, pdcp_id_node(bus->on_wire.id));
     const pdcp_identity_t *identity = &watch->limb->parts[sender].ini->desc.identity;

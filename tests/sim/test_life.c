@@ -35,6 +35,7 @@ typedef struct {
     life_memory_t memory;
     life_counters_t counters;
     life_watch_t watch;
+    life_forger_t forger;
     life_random_t random;
     uint32_t seed;
     uint32_t ms;         /* of this life */
@@ -72,68 +73,6 @@ void tearDown(void) {}
 static uint32_t chance(uint32_t below)
 {
     return life_random(&life.random, below);
-}
-
-/* --- What is looked for and what happens, one by one --- */
-
-/* Switched on by --with=NAME,NAME or --with=all. Without it a life is what it was before there were these. */
-enum {
-    VALUES,
-    FLAGS,
-    TWINS,
-    CLONES_COME,
-    LOOSE_PLUGS,
-    LOST_FRAMES,
-    RESTARTS,
-    FORGED_FLAGS,
-    FORGED_SOURCES,
-    FORGED_SUSPENDS,
-    FORGED_RESETS,
-    UNKNOWN_BEACONS,
-    FOREIGN_BEACONS,
-    SWITCHES
-};
-
-static struct {
-    const char *name;
-    bool on;
-} switches[SWITCHES] = {
-    [VALUES] = {"values", false},
-    [FLAGS] = {"flags", false},
-    [TWINS] = {"twins", false},
-    [CLONES_COME] = {"clones", false},
-    [LOOSE_PLUGS] = {"loose", false},
-    [LOST_FRAMES] = {"lost", false},
-    [RESTARTS] = {"restarts", false},
-    [FORGED_FLAGS] = {"enabled", false},
-    [FORGED_SOURCES] = {"source", false},
-    [FORGED_SUSPENDS] = {"suspend", false},
-    [FORGED_RESETS] = {"reset", false},
-    [UNKNOWN_BEACONS] = {"unknown", false},
-    [FOREIGN_BEACONS] = {"foreign", false},
-};
-
-static bool is_on(int number)
-{
-    return switches[number].on;
-}
-
-static bool is_listed(const char *list, const char *name)
-{
-    const size_t len = strlen(name);
-    for (const char *at = strstr(list, name); at != NULL; at = strstr(at + 1, name)) {
-        if ((at == list || at[-1] == ',') && (at[len] == ',' || at[len] == '\0')) {
-            return true;
-        }
-    }
-    return false;
-}
-
-static void switch_on(const char *list)
-{
-    for (int i = 0; i < SWITCHES; i++) {
-        switches[i].on = switches[i].on || strcmp(list, "all") == 0 || is_listed(list, switches[i].name);
-    }
 }
 
 /* --- Parts --- */
@@ -193,7 +132,7 @@ static void add_part(int number)
                    100 + chance(900), 20 + chance(200), REFUSED, LONG_VALUE,
                    chance(8) == 0 ? "[parameter 8 1]\nvalue = x\n" : "");
     (void)limb_add_with(&life.limb, (uint16_t)(number + 1), channels, more);
-    if (is_on(CLONES_COME) && number < CLONES) {
+    if (life_is_on(LIFE_CLONES_COME) && number < CLONES) {
         (void)snprintf(clones[number].channels, sizeof clones[number].channels, "%s", channels);
         (void)snprintf(clones[number].more, sizeof clones[number].more, "%s", more);
     }
@@ -202,7 +141,7 @@ static void add_part(int number)
 /* Parts with the identities of others. */
 static void add_clones(void)
 {
-    for (int i = 0; is_on(CLONES_COME) && i < CLONES; i++) {
+    for (int i = 0; life_is_on(LIFE_CLONES_COME) && i < CLONES; i++) {
         (void)limb_add_with(&life.limb, (uint16_t)(i + 1), clones[i].channels, clones[i].more);
     }
 }
@@ -451,7 +390,7 @@ static bool is_plugged(int part)
 /* One frame is lost: all that matters is repeated, and a limb must not notice. */
 static void lose_one(void)
 {
-    if (is_on(LOST_FRAMES)) {
+    if (life_is_on(LIFE_LOST_FRAMES)) {
         life.lose_in = 1 + chance(10);
     }
 }
@@ -485,116 +424,67 @@ static void restart(void)
     stop_arbitrator(0);
 }
 
-static void forge(uint16_t id, uint8_t len, uint8_t code, uint8_t second, uint8_t third, uint8_t fourth,
-                  uint8_t fifth)
-{
-    const can_frame_t frame = {.id = id, .dlc = len, .data = {code, second, third, fourth, fifth}};
-    (void)sim_bus_send(&life.limb.world.bus, life.foreign_port, &frame);
-}
-
-/* The id to which somebody else's request goes, in the arbitrator's name. */
-static uint16_t request_id(int part)
-{
-    return pdcp_can_id(PDCP_PRIORITY_NORMAL, true,
-                       pdcp_device_node_id(sim_node_device(life.limb.parts[part].node)));
-}
-
-/* A part that is plugged in, and one of its channels; false: none was found. */
-static bool pick_channel(int *part, uint8_t *channel)
-{
-    *part = (int)chance((uint32_t)life.limb.count);
-    const uint8_t count = ini_of(*part)->desc.channel_count;
-    *channel = count != 0 ? (uint8_t)(1 + chance(count)) : 0;
-    return is_plugged(*part) && count != 0;
-}
-
 static void forge_flag(void)
 {
-    int part;
-    uint8_t channel;
-    if (pick_channel(&part, &channel)) {
-        forge(request_id(part), 4, PDCP_SET_PARAMETER, PDCP_CH_ENABLED, channel, 0, 0);
-    }
+    life_forge_flag(&life.forger);
 }
 
-/* An input is to hear another output. */
 static void forge_source(void)
 {
-    int part;
-    int other;
-    uint8_t channel;
-    uint8_t output;
-    if (pick_channel(&part, &channel) && pick_channel(&other, &output) && part != other &&
-        ini_of(part)->desc.channels[channel - 1].direction == PDCP_INPUT) {
-        const pdcp_device_t *source = sim_node_device(life.limb.parts[other].node);
-        life.watch.forged_ms[part][channel] = life.ms + LIFE_AUDIT_MS;
-        forge(request_id(part), 5, PDCP_SET_PARAMETER, PDCP_IN_SOURCE_NODES, channel,
-              pdcp_device_node_id(source), pdcp_device_channel(source, output)->node_id);
-    }
+    life_forge_source(&life.forger, life.ms);
 }
 
 static void forge_suspend(void)
 {
-    int part;
-    uint8_t channel;
-    if (pick_channel(&part, &channel)) {
-        forge(request_id(part), 3, PDCP_SUSPEND, 0, 0, 0, 0);
-    }
+    life_forge_suspend(&life.forger);
 }
 
 static void forge_reset(void)
 {
-    int part;
-    uint8_t channel;
-    if (pick_channel(&part, &channel)) {
-        forge(request_id(part), 1, PDCP_RESET, 0, 0, 0, 0);
-    }
+    life_forge_reset(&life.forger);
 }
 
 static void beacon_of_unknown(void)
 {
-    const uint8_t id = (uint8_t)(1 + chance(254));
-    if (life.limb.world.app != NULL && life.limb.app.arb.bus.nodes.owner[id] == 0) {
-        forge(id, 1, PDCP_BEACON, 0, 0, 0, 0);
-    }
+    life_forge_unknown(&life.forger);
 }
 
 static void beacon_of_another(void)
 {
-    forge(0x100, 1, PDCP_BEACON, 0, 0, 0, 0);
+    life_forge_arbitrator(&life.forger);
     life_watch_rough(&life.watch, -1, life.ms + STANDBY_MS);
 }
 
 static const struct {
     void (*happens)(void);
-    int number; /* of its switch; SWITCHES: it always happens */
+    int number; /* of its switch; LIFE_SWITCHES: it always happens */
     uint8_t weight;
-} events[] = {{ask, SWITCHES, 30},
-              {plug_or_pull, SWITCHES, 12},
-              {mute, SWITCHES, 6},
-              {refuse, SWITCHES, 6},
-              {spoil_line, SWITCHES, 3},
-              {black_out, SWITCHES, 2},
-              {wear_memory, SWITCHES, 4},
-              {cut_power, SWITCHES, 2},
-              {babble, SWITCHES, 4},
-              {turn_deaf, SWITCHES, 2},
-              {close_host, SWITCHES, 2},
-              {meet_another, SWITCHES, 1},
-              {plug_or_pull_clone, CLONES_COME, 8},
-              {loosen_plug, LOOSE_PLUGS, 8},
-              {lose_one, LOST_FRAMES, 8},
-              {restart, RESTARTS, 3},
-              {forge_flag, FORGED_FLAGS, 4},
-              {forge_source, FORGED_SOURCES, 6},
-              {forge_suspend, FORGED_SUSPENDS, 3},
-              {forge_reset, FORGED_RESETS, 3},
-              {beacon_of_unknown, UNKNOWN_BEACONS, 2},
-              {beacon_of_another, FOREIGN_BEACONS, 1}};
+} events[] = {{ask, LIFE_SWITCHES, 30},
+              {plug_or_pull, LIFE_SWITCHES, 12},
+              {mute, LIFE_SWITCHES, 6},
+              {refuse, LIFE_SWITCHES, 6},
+              {spoil_line, LIFE_SWITCHES, 3},
+              {black_out, LIFE_SWITCHES, 2},
+              {wear_memory, LIFE_SWITCHES, 4},
+              {cut_power, LIFE_SWITCHES, 2},
+              {babble, LIFE_SWITCHES, 4},
+              {turn_deaf, LIFE_SWITCHES, 2},
+              {close_host, LIFE_SWITCHES, 2},
+              {meet_another, LIFE_SWITCHES, 1},
+              {plug_or_pull_clone, LIFE_CLONES_COME, 8},
+              {loosen_plug, LIFE_LOOSE_PLUGS, 8},
+              {lose_one, LIFE_LOST_FRAMES, 8},
+              {restart, LIFE_RESTARTS, 3},
+              {forge_flag, LIFE_FORGED_FLAGS, 4},
+              {forge_source, LIFE_FORGED_SOURCES, 6},
+              {forge_suspend, LIFE_FORGED_SUSPENDS, 3},
+              {forge_reset, LIFE_FORGED_RESETS, 3},
+              {beacon_of_unknown, LIFE_UNKNOWN_BEACONS, 2},
+              {beacon_of_another, LIFE_FOREIGN_BEACONS, 1}};
 
 static uint8_t weight_of(unsigned k)
 {
-    return events[k].number == SWITCHES || is_on(events[k].number) ? events[k].weight : 0;
+    return events[k].number == LIFE_SWITCHES || life_is_on(events[k].number) ? events[k].weight : 0;
 }
 
 static void happen(void)
@@ -697,15 +587,16 @@ static void begin_life(uint32_t seed)
     life.limb.world.bus.fault = line_loses;
     life.foreign_port = sim_bus_attach(&life.limb.world.bus, on_frame, NULL);
     const int parts = 2 + (int)chance(PARTS_MAX - 1);
+    life.forger = (life_forger_t){&life.limb, &life.random, &life.watch, life.foreign_port};
     life.parts = parts;
     for (int i = 0; i < parts; i++) {
         add_part(i);
     }
     add_clones();
     life_watch_init(&life.watch, &life.limb);
-    life.watch.values = is_on(VALUES);
-    life.watch.flags = is_on(FLAGS);
-    life.watch.twins = is_on(TWINS);
+    life.watch.values = life_is_on(LIFE_VALUES);
+    life.watch.flags = life_is_on(LIFE_FLAGS);
+    life.watch.twins = life_is_on(LIFE_TWINS);
     start_arbitrator();
 }
 
@@ -732,7 +623,8 @@ static void storm(void)
 static void forge_at_last(void)
 {
     for (unsigned k = 0; k < sizeof events / sizeof events[0]; k++) {
-        if (events[k].number >= FORGED_FLAGS && events[k].number < SWITCHES && is_on(events[k].number)) {
+        if (events[k].number >= LIFE_FORGED_FLAGS && events[k].number < LIFE_SWITCHES &&
+            life_is_on(events[k].number)) {
             events[k].happens();
         }
     }
@@ -790,6 +682,7 @@ static void test_lives(void)
     uint64_t changes = 0;
     uint64_t frames = 0;
     uint64_t events_told = 0;
+    uint64_t taken = 0;
     uint32_t longest_ms = 0;
     for (uint32_t seed = first_seed; seed < first_seed + seeds; seed++) {
         begin_life(seed);
@@ -800,6 +693,7 @@ static void test_lives(void)
         changes += life.memory.changes;
         frames += life.frames;
         events_told += life.host.events;
+        taken += life.watch.taken;
         longest_ms = life.host.longest_ms > longest_ms ? life.host.longest_ms : longest_ms;
         limb_end(&life.limb);
     }
@@ -810,6 +704,16 @@ static void test_lives(void)
         (unsigned)seeds, (STORM_MS + CALM_MS + WATCH_MS) / 1000, (unsigned long long)frames,
         (unsigned long long)asked, (unsigned long long)failed, (unsigned)longest_ms,
         (unsigned long long)events_told, (unsigned long long)changes);
+    if (life_is_on(LIFE_VALUES)) {
+        (void)printf("%llu values, each of them of the input's source\n", (unsigned long long)taken);
+    }
+}
+
+/* The same with all that holds. */
+static void test_lives_with_more(void)
+{
+    life_switch_on("held");
+    test_lives();
 }
 
 /* --- What lives have shown --- */
@@ -990,8 +894,9 @@ static void test_nothing_is_saved_on_standby(void)
 int main(int argc, char **argv)
 {
     const char *count = getenv("LIFE_COUNT");
-    if (argc > 1 && strncmp(argv[1], "--with=", 7) == 0) {
-        switch_on(argv[1] + 7);
+    const bool chosen = argc > 1 && strncmp(argv[1], "--with=", 7) == 0;
+    if (chosen) {
+        life_switch_on(argv[1] + 7);
         argc--;
         argv++;
     }
@@ -999,7 +904,7 @@ int main(int argc, char **argv)
     seeds = argc > 2 ? (uint32_t)strtoul(argv[2], NULL, 0) : (argc > 1 ? 1 : LIVES);
     seeds = count != NULL ? (uint32_t)strtoul(count, NULL, 0) : seeds;
     UNITY_BEGIN();
-    if (argc == 1) {
+    if (argc == 1 && !chosen) {
         RUN_TEST(test_lives_that_found_something);
         RUN_TEST(test_a_removed_link_is_missed);
         RUN_TEST(test_a_mute_device_holds_up_nobody);
@@ -1008,6 +913,9 @@ int main(int argc, char **argv)
         RUN_TEST(test_a_device_goes_while_sole_access_is_enforced);
     }
     RUN_TEST(test_lives);
+    if (argc == 1 && !chosen) {
+        RUN_TEST(test_lives_with_more);
+    }
     if (Unity.TestFailures != 0) {
         (void)printf("the life with seed %u, at %u ms\n", (unsigned)life.seed, (unsigned)life.ms);
     }

@@ -3,10 +3,10 @@
 # Constants and texts are in RAM there. A program with too many is built in parts, which run some of its tests each
 # (target/prelude.h).
 set(avr16_parts_test_acceptance 1)
-set(avr16_parts_test_arb_app 10)
-set(avr16_parts_test_arb_hostapi 60)
-set(avr16_parts_test_arb_hostevents 8)
-set(avr16_parts_test_arb_hostext 32)
+set(avr16_parts_test_arb_app 6)
+set(avr16_parts_test_arb_hostapi 33)
+set(avr16_parts_test_arb_hostevents 4)
+set(avr16_parts_test_arb_hostext 27)
 set(avr16_parts_test_pdcp_device 5)
 set(avr16_parts_test_pdcp_exhaustive 4)
 set(avr16_parts_test_pdcp_link 3)

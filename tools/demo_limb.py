@@ -40,6 +40,7 @@ TRACE_WIDTH = 30
 STEP_S = 0.05  # of a trace
 SETUP_TIMEOUT_S = 15.0
 ONCE_S = 2.0
+ONCE_TRIES = 5  # a busy machine lets values wait
 REPAIRED_ONCE_S = 0.6
 BEFORE_SWAP_S = 8.0  # unless --once
 PULLED_S = 1.0  # between the loss and the replacement
@@ -375,16 +376,25 @@ def swap_sensor(limb: Limb, sensor: Program, console: Console) -> None:
     console.print(f"{took_ms:.0f} ms after its power-on its values arrive at the hand; nobody asked for it.")
 
 
+def await_sine(limb: Limb, sine: Sine, names: Names, console: Console) -> None:
+    """Shows what arrives until it is the sensor's sine, on time. Fails when it never is."""
+    for _ in range(ONCE_TRIES):
+        kept = show_values(limb, names, console, ONCE_S)
+        fault = check_values(sine, kept)
+        if not fault:
+            console.print(f"[green]{len(kept)} values have arrived, and they are the sine that D1 sends.[/green]")
+            return
+    raise DemoError(fault)
+
+
 def run(limb: Limb, console: Console, once: bool) -> None:
     sine = read_sine(SENSOR)
     sensor = limb.plug(SENSOR)
     names = show_limb(limb, console)
-    kept = show_values(limb, names, console, ONCE_S if once else BEFORE_SWAP_S)
     if once:
-        fault = check_values(sine, kept)
-        if fault:
-            raise DemoError(fault)
-        console.print(f"[green]{len(kept)} values have arrived, and they are the sine that D1 sends.[/green]")
+        await_sine(limb, sine, names, console)
+    else:
+        show_values(limb, names, console, BEFORE_SWAP_S)
     swap_sensor(limb, sensor, console)
     names = show_limb(limb, console)
     kept = show_values(limb, names, console, REPAIRED_ONCE_S if once else math.inf)
@@ -403,8 +413,8 @@ class Parser(argparse.ArgumentParser):
 
 def parse_arguments(arguments: list[str]) -> argparse.Namespace:
     parser = Parser(prog="tools/demo", description="A limb of three simulated devices that links and repairs itself.")
-    parser.add_argument("--once", action="store_true", help="end after 6 s, with exit status 0 only if the sine of "
-                        "D1 arrived at both inputs of D3, and after the swap that of D4")
+    parser.add_argument("--once", action="store_true", help="end after 6 s, later on a busy machine, with exit status "
+                        "0 only if the sine of D1 arrived at both inputs of D3, and after the swap that of D4")
     parser.add_argument("--bin", type=Path, default=Path("build/default/bin"), metavar="FOLDER",
                         help="where pdcpd is (default: %(default)s)")
     return parser.parse_args(arguments)

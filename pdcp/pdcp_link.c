@@ -62,9 +62,9 @@ static void drop_todo(pdcp_channel_t *channel, unsigned todo)
 }
 
 /* Notes what is to be done. A silence that is needed is never forgotten: what was noted before stays, until
- * its own job begins or a job that silences the input, too, whatever comes of it. Making a link begins with
- * the input off, and silences it again when it fails or cannot start. Taking one away silences the input, and
- * leaves nothing to be made. */
+ * its own job begins, its device is lost, or a job is noted that silences the input, too, whatever comes of
+ * it. Making a link begins with the input off, and silences it again when it fails or cannot start. Taking
+ * one away silences the input, and leaves nothing to be made. */
 static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[number];
@@ -229,7 +229,7 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
             (channel->node == node || owner_of(bus, channel->feed) == node)) {
             pdcp_link_rest(bus, i);
         }
-        if (channel->node == node) { /* nothing can be written to it */
+        if (channel->node == node) { /* nothing can be written to it; its next setup silences it first */
             channel->enabled = false;
             channel->todo = PDCP_TODO_NONE;
         }

@@ -158,9 +158,10 @@ static void check_active(const limb_t *limb, const limb_part_t *part, const pdcp
  * heard so far, too. */
 static bool is_being_silenced(const limb_t *limb, uint8_t number)
 {
-    const unsigned todo = nodes_of(limb)->channels[number].todo;
+    const unsigned silences = (unsigned)PDCP_TODO_SILENCE | (unsigned)PDCP_TODO_REMOVE |
+                              (unsigned)PDCP_TODO_CONNECT | (unsigned)PDCP_TODO_AGAIN;
     const pdcp_link_t *job = &limb->app.arb.bus.link;
-    return (todo & ~(unsigned)PDCP_TODO_UPDATE) != 0 ||
+    return (nodes_of(limb)->channels[number].todo & silences) != 0 ||
            (job->active && (job->input == number || job->output == number || job->old_feed == number));
 }
 

@@ -383,7 +383,9 @@ static bool start(daemon_t *daemon)
                                      .seed = hal_sys_random(),
                                      .strict_crc = daemon->options.strict_crc,
                                      .no_autoconfig = daemon->options.no_autoconfig};
-    const uint32_t now_ms = (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);
+    /* The simulated bus begins where it was opened: the application's time never runs backwards. */
+    const uint32_t now_ms = daemon->world != NULL ? sim_world_ms(daemon->world)
+                                                  : (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);
     arb_app_init(&daemon->app, &daemon->port, &settings, now_ms);
     arb_app_observe(&daemon->app, on_event, daemon);
     if (daemon->app.store.damaged != 0) {

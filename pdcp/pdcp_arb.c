@@ -883,7 +883,7 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 static bool is_hung(const pdcp_arb_t *arb)
 {
     return !arb->silent && !arb->listening && arb->recovery.state < (uint8_t)PDCP_BUS_OFF &&
-           arb->bus.now_ms - arb->beacon_ms > PDCP_HUNG_MS;
+           pdcp_time_before(arb->beacon_ms + PDCP_HUNG_MS, arb->bus.now_ms);
 }
 
 uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)

@@ -219,6 +219,7 @@ static void start_arbitrator(void)
     sim_nvm_power_on(&life.limb.nvm);
     life.worn_until = 0;
     life_memory_start(&life.memory);
+    life.limb.settings.seed = life.seed * 2654435761u + life.ms; /* another one at each start (D-BUS-36) */
     limb_start_arbitrator(&life.limb);
     life.limb.port.can_send = can_send;
     life.limb.port.can_restart = can_restart;

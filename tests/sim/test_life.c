@@ -24,7 +24,8 @@ enum {
     REFUSED = 240, /* [parameter] of each part that stands for what it refuses */
     LONG_VALUE = 241,
     RECOVERY_MS =
-        3200, /* longest pause after a black-out until the controller is on again (PDCP_RECOVERY_MS) */
+        3200,       /* longest pause after a black-out until the controller is on again (PDCP_RECOVERY_MS) */
+    LOST_MS = 3000, /* between two frames that are lost one by one */
     STANDBY_MS = 3000, /* an arbitrator is silent so long after another's beacon, at most (D-BUS-12) */
     TEXT = 2000
 };
@@ -53,7 +54,8 @@ typedef struct {
     uint32_t loose_until[ALL_MAX];
     int parts; /* those after them are clones */
     uint32_t loss_percent;
-    uint32_t lose_in; /* frames, until one is lost; 0: none will be */
+    uint32_t lose_in;       /* frames, until one is lost; 0: none will be */
+    uint32_t lose_again_ms; /* not before */
     int foreign_port;
     bool is_off; /* the bus, for the arbitrator's controller */
     bool watching;
@@ -217,6 +219,7 @@ static void start_arbitrator(void)
     sim_nvm_power_on(&life.limb.nvm);
     life.worn_until = 0;
     life_memory_start(&life.memory);
+    life.limb.settings.seed = life.seed * 2654435761u + life.ms; /* another one at each start (D-BUS-36) */
     limb_start_arbitrator(&life.limb);
     life.limb.port.can_send = can_send;
     life.limb.port.can_restart = can_restart;
@@ -387,11 +390,13 @@ static bool is_plugged(int part)
     return life.limb.parts[part].node != NULL;
 }
 
-/* One frame is lost: all that matters is repeated, and a limb must not notice. */
+/* One frame is lost, and none for some time before and behind it: all that matters is repeated, and a limb
+ * must not notice. */
 static void lose_one(void)
 {
-    if (life_is_on(LIFE_LOST_FRAMES)) {
+    if (life_is_on(LIFE_LOST_FRAMES) && life.ms >= life.lose_again_ms) {
         life.lose_in = 1 + chance(10);
+        life.lose_again_ms = life.ms + LOST_MS;
     }
 }
 

@@ -190,9 +190,15 @@ static void enter_bound(pdcp_device_t *dev, uint32_t now_ms)
     }
 }
 
+/* Nobody watches what it sends and hears, and its ids may be given to others meanwhile: it takes no part until an
+ * arbitrator enables its channels again (D-BUS-35). */
 static void enter_alone(pdcp_device_t *dev)
 {
     dev->bulk.mode = PDCP_DEVICE_BULK_IDLE;
+    for (uint8_t i = 0; i < dev->desc->channel_count; i++) {
+        dev->channels[i].enabled = false;
+    }
+    dev->listen_changes++;
     safe_inputs(dev);
 }
 

@@ -324,7 +324,7 @@ static void spoil_line(void)
 static void black_out(void)
 {
     life.black_until = life.ms + 20 + chance(2500);
-    life_watch_rough(&life.watch, -1, life.black_until + RECOVERY_MS);
+    life_watch_rough(&life.watch, -1, life.black_until);
 }
 
 static void wear_memory(void)
@@ -560,6 +560,9 @@ static void pass_ms(void)
     carry_on();
     if (life.limb.world.app != NULL) {
         tell_state();
+    }
+    if (life.is_off) {
+        life_watch_rough(&life.watch, -1, life.ms);
     }
     limb_run_ms(&life.limb, 1);
     life.ms++;

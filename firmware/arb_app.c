@@ -41,6 +41,7 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
                   settings->no_autoconfig ? ARB_FLAG_AUTOCONFIGURE : 0, now_ms);
     app->api.strict = (arb_limb_flags(&app->limb) & ARB_FLAG_STRICT_CRC) != 0;
     pdcp_arb_plan_links(&app->arb, false);
+    pdcp_arb_audit(&app->arb, now_ms);
 }
 
 void arb_app_observe(arb_app_t *app, arb_observer_t observer, void *ctx)

@@ -28,7 +28,7 @@ static const arb_message_t messages[] = {
     {ARB_MSG_WRITE_CONFIGS, 5, 1, 0, 0, arb_hostext_write_configs},
     {ARB_MSG_REMOVE_LINK, 7, 0, 1, 1, arb_hostext_remove_link},
     {ARB_MSG_STATISTICS, 1, 0, 0, 0, arb_hostext_statistics},
-    {ARB_MSG_EVENT_STREAM, 1, 0, 0, 0, arb_hostext_event_stream},
+    {ARB_MSG_EVENT_STREAM, 1, 1, 0, 0, arb_hostext_event_stream},
 };
 
 /* NULL: there is no message with this id. */

@@ -25,7 +25,7 @@ static uint8_t *put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t 
     return &bytes[1 + ARB_EVENT_HEAD];
 }
 
-void arb_hostevents_set_mask(arb_hostevents_t *events, uint8_t mask)
+void arb_hostevents_set_mask(arb_hostevents_t *events, uint16_t mask)
 {
     events->mask = mask;
     if (events->out.len != 0 && events->out.sent == 0 &&
@@ -87,6 +87,18 @@ static void put_state(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t 
     }
 }
 
+static void put_audit(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
+                      const pdcp_event_t *event)
+{
+    const pdcp_nodes_t *nodes = &arb->bus.nodes;
+    const pdcp_channel_t *channel = &nodes->channels[event->channel];
+    uint8_t *data = put(events, now_ms, ARB_EVENT_AUDIT, 8);
+    if (data != NULL) {
+        arb_host_put_channel(data, &nodes->nodes[channel->node].identity, channel->index);
+        data[7] = event->param;
+    }
+}
+
 void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                              const pdcp_event_t *event)
 {
@@ -95,6 +107,8 @@ void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, ui
         put_device(events, arb, now_ms, event);
     } else if (kind == PDCP_EVENT_LINK) {
         put_link(events, arb, now_ms, event->channel);
+    } else if (kind == PDCP_EVENT_AUDIT) {
+        put_audit(events, arb, now_ms, event);
     } else if (kind == PDCP_EVENT_STATE || kind == PDCP_EVENT_SILENT || kind == PDCP_EVENT_STARTED) {
         put_state(events, arb, now_ms);
     }

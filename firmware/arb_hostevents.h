@@ -21,7 +21,8 @@ typedef enum {
     ARB_EVENT_CONFIG = 4,    /* active8, stored8 */
     ARB_EVENT_FRAME = 5,     /* id16, DLC8, DLC bytes of data; of both directions */
     ARB_EVENT_BUS_STATE = 6, /* state8 (arb_bus_state_t), transmit errors8, receive errors8 */
-    ARB_EVENT_KINDS = 6
+    ARB_EVENT_AUDIT = 9,     /* chan, parameter8: the device did not have what the tables say (D-BUS-40) */
+    ARB_EVENT_KINDS = 9      /* 7 and 8 are kept for later ones (D-API-19, D-API-20) */
 } arb_event_kind_t;
 
 typedef enum { ARB_BUS_ACTIVE = 0, ARB_BUS_PASSIVE = 1, ARB_BUS_OFF = 2, ARB_BUS_SILENT = 3 } arb_bus_state_t;
@@ -34,7 +35,7 @@ enum {
 };
 
 typedef struct {
-    uint8_t mask;      /* bit k: kind k + 1 is wanted; 0: the stream is off */
+    uint16_t mask;     /* bit k: kind k + 1 is wanted; 0: the stream is off */
     uint8_t tx_errors; /* of the controller, as told last */
     uint8_t rx_errors;
     uint8_t used;                           /* bytes of queue */
@@ -44,8 +45,8 @@ typedef struct {
     uint8_t queue[ARB_EVENT_QUEUE]; /* events that wait, the oldest first */
 } arb_hostevents_t;
 
-/* Bits of the kinds that there are. */
-#define ARB_EVENT_MASK ((1u << ARB_EVENT_KINDS) - 1u)
+/* Bits of the kinds that there are: 1 to 6, and 9. */
+#define ARB_EVENT_MASK 0x013Fu
 
 static inline bool arb_hostevents_wants(const arb_hostevents_t *events, arb_event_kind_t kind)
 {
@@ -53,7 +54,7 @@ static inline bool arb_hostevents_wants(const arb_hostevents_t *events, arb_even
 }
 
 /* From now on these kinds; events of others that still wait are never sent. */
-void arb_hostevents_set_mask(arb_hostevents_t *events, uint8_t mask);
+void arb_hostevents_set_mask(arb_hostevents_t *events, uint16_t mask);
 
 /* The host is gone: whoever comes next has not asked for anything. */
 void arb_hostevents_end(arb_hostevents_t *events);

@@ -207,10 +207,13 @@ uint8_t arb_hostext_statistics(arb_call_t *call)
     }
 }
 
-/* 2416h: mask. */
+/* 2416h: a mask of 8 or 16 bits (D-API-20). */
 uint8_t arb_hostext_event_stream(arb_call_t *call)
 {
-    const uint8_t mask = call->payload[0];
+    if (call->len > 2) {
+        return ARB_ERR_SIZE;
+    }
+    const uint16_t mask = call->len == 2 ? arb_host_get_u16(call->payload) : call->payload[0];
     if ((mask & ~ARB_EVENT_MASK) != 0) {
         return ARB_ERR_VALUE;
     }

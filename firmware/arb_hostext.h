@@ -8,7 +8,7 @@
  * Group 1, host link: bytes received, bytes sent, requests received, bytes skipped between messages, headers
  * with an impossible size, messages with a wrong CRC8, with a wrong CRC16, messages given up in the middle,
  * requests answered with 07h because four were held, with 2200h, events sent, events dropped for want of
- * room, of kind 1 to 6.
+ * room, of kind 1 to 9 (of 7 and 8, which are kept for later, none).
  *
  * Group 2, storage: writes of the identities that failed, copies of them that were damaged at the start, the
  * same two of the flags; of the configurations, in the order of arb_config_counter_t.

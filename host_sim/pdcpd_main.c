@@ -82,6 +82,15 @@ static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
         input->link == PDCP_LINK_ACTIVE ? "active" : "inactive", outcome);
 }
 
+static void say_audit(const daemon_t *daemon, const pdcp_event_t *event)
+{
+    const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
+    const pdcp_channel_t *channel = &nodes->channels[event->channel];
+    const pdcp_identity_t *owner = &nodes->nodes[channel->node].identity;
+    say(daemon, PDCPD_LOG_WARNING, "%u:%u:%u.%u had a wrong parameter %u", owner->vid, owner->pid, owner->sn,
+        channel->index, event->param);
+}
+
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
 {
     const daemon_t *daemon = ctx;
@@ -127,6 +136,9 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
         break;
     case PDCP_EVENT_LINK:
         say_link(daemon, event);
+        break;
+    case PDCP_EVENT_AUDIT:
+        say_audit(daemon, event);
         break;
     default:
         break;

@@ -21,6 +21,8 @@ static void forget_bus(pdcp_arb_t *arb)
     }
     pdcp_txq_init(&arb->bus.txq);
     pdcp_link_init(&arb->bus);
+    pdcp_audit_init(&arb->bus);
+    memset(&arb->bus.suspend, 0, sizeof arb->bus.suspend);
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_LINK, PDCP_CLOSED_MS);
     memset(arb->bus.bind.reserved, 0, sizeof arb->bus.bind.reserved);
     arb->asked_ms = arb->bus.now_ms;
@@ -132,6 +134,7 @@ static void begin_setup(pdcp_arb_t *arb, uint8_t node)
     device->setup_again = false;
     device->heard_ms = arb->bus.now_ms;
     device->taken_back = false;
+    arb->bus.suspend.left[node] = 0;
     pdcp_setup_start(&arb->bus, node);
     expect_life(arb, node);
 }
@@ -426,6 +429,17 @@ static void on_foreign_answer(pdcp_arb_t *arb, const can_frame_t *frame)
     }
 }
 
+/* Somebody else speaks to devices in the name of an arbitrator: what they have may no longer be what the
+ * tables say (D-BUS-40). */
+static void on_foreign_request(pdcp_arb_t *arb, const can_frame_t *frame)
+{
+    const uint8_t id = pdcp_id_node(frame->id);
+    pdcp_audit_on_foreign(&arb->bus, id);
+    if (frame->dlc == 3 && frame->data[0] == PDCP_SUSPEND) {
+        pdcp_suspend_on_foreign(&arb->bus, id);
+    }
+}
+
 static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
@@ -442,6 +456,7 @@ static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
         on_foreign_grant(arb, &msg.identity);
     } else {
         pdcp_standby_on_request(&arb->standby, frame);
+        on_foreign_request(arb, frame);
     }
 }
 
@@ -565,6 +580,9 @@ static void host_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *rep
     }
     if (success && host->code == PDCP_SET_PARAMETER) {
         host_has_set(arb);
+    } else if (success && (host->code == PDCP_SUSPEND || host->code == PDCP_RELEASE)) {
+        pdcp_suspend_on_host(&arb->bus, node, host->code,
+                             raw ? pdcp_value_u16(host->bytes, host->size, 1) : host->size);
     }
     if (reply->len != 0 && (raw || (host->code == PDCP_GET_PARAMETER && end <= host->size))) {
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);
@@ -619,6 +637,7 @@ static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
     if (device->state == PDCP_NODE_READY) {
         pdcp_bind_on_ready(&arb->bus, device);
         pdcp_link_on_ready(&arb->bus, node);
+        pdcp_audit_on_ready(&arb->bus, node);
     } else if (device->state == PDCP_NODE_FAILED) {
         arb->bus.link.due = true; /* an Update Data Channel may have waited for it */
     }
@@ -627,7 +646,8 @@ static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
 static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
     const pdcp_status_t status = (pdcp_status_t)reply->status;
-    if (reply->done && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
+    const bool unheard = reply->client == PDCP_CLIENT_AUDIT && status == PDCP_ERR_NO_ANSWER; /* of one try */
+    if (reply->done && !unheard && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
         return;
     }
     if (reply->client == PDCP_CLIENT_SETUP) {
@@ -636,6 +656,8 @@ static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
         pdcp_link_on_reply(&arb->bus, reply);
     } else if (reply->client == PDCP_CLIENT_RESET) {
         reset_on_reply(arb, node, status);
+    } else if (reply->client == PDCP_CLIENT_AUDIT) {
+        pdcp_audit_on_reply(&arb->bus, reply);
     } else if (reply->client == PDCP_CLIENT_HOST || reply->client == PDCP_CLIENT_RAW) {
         host_on_reply(arb, node, reply);
     }
@@ -780,6 +802,7 @@ static void on_beacon_deadline(pdcp_arb_t *arb)
     if (arb->silent) {
         take_over(arb);
     }
+    pdcp_suspend_on_beacon(&arb->bus);
     send_beacon(arb);
 }
 
@@ -858,6 +881,12 @@ static void on_request_deadline(pdcp_arb_t *arb, uint8_t node)
     serve(arb, node);
 }
 
+static void on_audit_deadline(pdcp_arb_t *arb)
+{
+    const bool calm = pdcp_link_is_settled(&arb->bus) && !pdcp_arb_setup_running(arb);
+    pdcp_audit_on_deadline(&arb->bus, calm);
+}
+
 static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 {
     if (timer == PDCP_TIMER_BEACON) {
@@ -867,6 +896,10 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
         pdcp_link_on_ready(&arb->bus, PDCP_NONE);
     } else if (timer == PDCP_TIMER_HOST) {
         on_host_deadline(arb);
+    } else if (timer == PDCP_TIMER_AUDIT) {
+        on_audit_deadline(arb);
+    } else if (timer == PDCP_TIMER_RELEASE) {
+        pdcp_suspend_on_deadline(&arb->bus);
     } else if (timer == PDCP_TIMER_STANDBY) {
         on_standby_deadline(arb);
     } else if (timer == PDCP_TIMER_RECOVERY) {
@@ -997,7 +1030,11 @@ void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms)
 
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 {
-    return !arb->silent && send(arb, PDCP_PRIORITY_NORMAL, PDCP_NODE_BROADCAST, code, time_ms);
+    if (arb->silent || !send(arb, PDCP_PRIORITY_NORMAL, PDCP_NODE_BROADCAST, code, time_ms)) {
+        return false;
+    }
+    pdcp_suspend_on_host(&arb->bus, PDCP_NONE, code, time_ms);
+    return true;
 }
 
 bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
@@ -1090,23 +1127,40 @@ void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored)
     arb->bus.link.stored = stored;
 }
 
+void pdcp_arb_audit(pdcp_arb_t *arb, uint32_t now_ms)
+{
+    arb->bus.now_ms = now_ms;
+    pdcp_audit_begin(&arb->bus);
+}
+
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     arb->bus.now_ms = now_ms;
-    pdcp_link_rest(&arb->bus, input);
+    pdcp_link_rest(&arb->bus, input, PDCP_OK);
 }
 
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
                        uint8_t index, uint16_t type, uint16_t profile)
 {
     pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
+    const bool named = pdcp_identity_equal(&channel->source, owner) && channel->source_index == index &&
+                       channel->source_type == type && channel->source_profile == profile;
     arb->bus.now_ms = now_ms;
     channel->source = *owner;
     channel->source_index = index;
     channel->source_type = type;
     channel->source_profile = profile;
     channel->link = PDCP_LINK_INACTIVE;
+    if (!named) {
+        pdcp_link_write(&arb->bus, input);
+    }
     pdcp_bus_tell_link(&arb->bus, PDCP_EVENT_LINK, input, PDCP_OK);
+}
+
+void pdcp_arb_forget_source(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+{
+    arb->bus.now_ms = now_ms;
+    pdcp_link_write(&arb->bus, input);
 }
 
 bool pdcp_arb_links_settled(const pdcp_arb_t *arb)

@@ -129,14 +129,21 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb);
  * when the bus is. */
 void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored);
 
+/* Begins to audit the devices (D-BUS-40, pdcp_audit.h), and never ends. */
+void pdcp_arb_audit(pdcp_arb_t *arb, uint32_t now_ms);
+
 /* Lets the active link of an input rest: both ends are disabled, its source stays written (D-PRO-9);
  * PDCP_EVENT_LINK comes at once. */
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
 
 /* Lists a link of an input that has none as inactive, with a source that need not be there: the output with
- * this channel index, type and profile, of the device owner. Nothing is sent. */
+ * this channel index, type and profile, of the device owner. An input that named another source is told
+ * (D-BUS-38). */
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
                        uint8_t index, uint16_t type, uint16_t profile);
+
+/* An input that has no link shall not name a source: it is told so (D-BUS-38). */
+void pdcp_arb_forget_source(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
 
 /* Have all links been made or taken away that were to be? A device that does not answer may still be told to
  * be silent (D-BUS-22). */

@@ -1,14 +1,16 @@
 /* What every part of the arbitrator shares: tables, deadlines, transmit queue, counters, and the way to tell
  * the application what has happened. Only the files of the arbitrator (pdcp_bind, _request, _setup, _link,
- * _arb) use this. */
+ * _audit, _suspend, _arb) use this. */
 #ifndef PDCP_BUS_H
 #define PDCP_BUS_H
 
+#include "pdcp_audit.h"
 #include "pdcp_bind.h"
 #include "pdcp_codec.h"
 #include "pdcp_link.h"
 #include "pdcp_nodes.h"
 #include "pdcp_stats.h"
+#include "pdcp_suspend.h"
 #include "pdcp_timer.h"
 #include "pdcp_txq.h"
 #include "pdcp_unknown.h"
@@ -28,6 +30,7 @@ typedef enum {
     PDCP_EVENT_SILENT,  /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
     PDCP_EVENT_STARTED, /* and has started afresh */
     PDCP_EVENT_STATE,   /* the bus has another state; status holds it (pdcp_bus_state_t) */
+    PDCP_EVENT_AUDIT,   /* channel: its device does not have what the tables say in param (D-BUS-40) */
     PDCP_EVENT_REQUEST  /* node: the host's request has ended with status; len bytes of value */
 } pdcp_event_kind_t;
 
@@ -35,6 +38,7 @@ typedef struct {
     pdcp_event_kind_t kind;
     uint8_t node;
     uint8_t channel;
+    uint8_t param; /* PDCP_EVENT_AUDIT: parameter id */
     int8_t status; /* pdcp_status_t */
     uint16_t len;
 } pdcp_event_t;
@@ -56,11 +60,13 @@ typedef struct pdcp_bus {
     pdcp_knows_fn knows;
     void *event_ctx;
     pdcp_link_t link;
+    pdcp_audit_t audit;
     pdcp_nodes_t nodes;
     pdcp_timers_t timers;
     pdcp_txq_t txq;
     uint32_t stats[PDCP_STAT_COUNT];
     pdcp_bind_t bind;
+    pdcp_suspend_t suspend;
     pdcp_unknown_t unknown;
 } pdcp_bus_t;
 
@@ -83,6 +89,9 @@ bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdc
 /* Tells of a device (PDCP_NONE: of none), or of an input and its link. */
 void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status);
 void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status);
+
+/* Tells of a channel whose device does not have what the tables say in this parameter. */
+void pdcp_bus_tell_audit(const pdcp_bus_t *bus, uint8_t channel, uint8_t param);
 
 /* The same of a device, when there is no more to say. */
 void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node);

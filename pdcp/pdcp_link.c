@@ -16,6 +16,7 @@ typedef enum {
     STEP_TYPE,
     STEP_NODES,
     STEP_INPUT_ON,
+    STEP_OUTPUT_ID_AGAIN, /* only when a link is written again */
     STEP_OUTPUT_ON,
     STEP_END
 } step_t;
@@ -50,11 +51,6 @@ static bool is_ready(pdcp_bus_t *bus, uint8_t channel)
     return node != PDCP_NONE && pdcp_bus_node(bus, node)->state == PDCP_NODE_READY;
 }
 
-static bool is_unconnected(const pdcp_channel_t *input)
-{
-    return input->source_index == PDCP_NO_SOURCE_INDEX || input->source_index == 0;
-}
-
 /* What is no longer to be done, because it was done or something else does it, too. */
 static void drop_todo(pdcp_channel_t *channel, unsigned todo)
 {
@@ -75,6 +71,7 @@ static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
         drop_todo(channel, SILENCES);
     }
     bus->link.due = true;
+    pdcp_audit_on_change(bus);
 }
 
 /* The output that an input names as its source, if its device is set up; an unconnected input names none. */
@@ -88,15 +85,20 @@ static uint8_t find_source(const pdcp_bus_t *bus, const pdcp_channel_t *input)
     return channel != PDCP_NONE && bus->nodes.channels[channel].transfer == PDCP_OUTPUT ? channel : PDCP_NONE;
 }
 
-static bool output_is_needed(const pdcp_bus_t *bus, uint8_t output)
+uint8_t pdcp_link_listener(const pdcp_bus_t *bus, uint8_t output)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &bus->nodes.channels[i];
         if (input->feed == output && input->link == PDCP_LINK_ACTIVE) {
-            return true;
+            return i;
         }
     }
-    return false;
+    return PDCP_NONE;
+}
+
+static bool output_is_needed(const pdcp_bus_t *bus, uint8_t output)
+{
+    return pdcp_link_listener(bus, output) != PDCP_NONE;
 }
 
 /* An output that no active link needs any more is to be disabled. */
@@ -128,6 +130,21 @@ bool pdcp_link_wish_waits(const pdcp_bus_t *bus)
 void pdcp_link_remove(pdcp_bus_t *bus, uint8_t input)
 {
     put_todo(bus, input, PDCP_TODO_REMOVE);
+}
+
+void pdcp_link_silence(pdcp_bus_t *bus, uint8_t channel)
+{
+    bus->nodes.channels[channel].enabled = true;
+    put_todo(bus, channel, PDCP_TODO_SILENCE);
+}
+
+void pdcp_link_write(pdcp_bus_t *bus, uint8_t input)
+{
+    pdcp_channel_t *channel = &bus->nodes.channels[input];
+    if (channel->link == PDCP_LINK_NONE) {
+        pdcp_nodes_clear_source(channel);
+    }
+    put_todo(bus, input, PDCP_TODO_WRITE);
 }
 
 static void answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, bool connected)
@@ -173,14 +190,14 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
 }
 
 /* A link rests: its input is silenced, and its output when nobody else listens. */
-void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input)
+void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input, pdcp_status_t status)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[input];
     channel->link = PDCP_LINK_INACTIVE;
     drop_todo(channel, PDCP_TODO_CONNECT);
     put_todo(bus, input, PDCP_TODO_SILENCE);
     release_output(bus, channel->feed);
-    pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, PDCP_OK);
+    pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, status);
 }
 
 static void give_back_old(const pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -200,7 +217,7 @@ static void leave_job(pdcp_bus_t *bus, uint8_t node)
         return;
     }
     if (owner_of(bus, bus->link.input) == node) {
-        if (!bus->link.undoing) {
+        if (!bus->link.undoing && bus->link.kind != PDCP_TODO_WRITE) {
             give_back_old(bus, &bus->nodes.channels[bus->link.input]);
         }
         bus->link.input = PDCP_NONE;
@@ -227,7 +244,7 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
         pdcp_channel_t *channel = &bus->nodes.channels[i];
         if (channel->link == PDCP_LINK_ACTIVE &&
             (channel->node == node || owner_of(bus, channel->feed) == node)) {
-            pdcp_link_rest(bus, i);
+            pdcp_link_rest(bus, i, PDCP_OK);
         }
         if (channel->node == node) { /* nothing can be written to it; its next setup silences it first */
             channel->enabled = false;
@@ -242,7 +259,7 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
 
 static bool is_about_output(const pdcp_bus_t *bus)
 {
-    return bus->link.step == STEP_OUTPUT_ON || bus->link.step == STEP_OUTPUT_ID;
+    return bus->link.step >= STEP_OUTPUT_ID_AGAIN || bus->link.step == STEP_OUTPUT_ID;
 }
 
 /* The channel that the current step is about. */
@@ -277,6 +294,7 @@ static void name_source(pdcp_bus_t *bus, pdcp_channel_t *input)
  * steps backwards, and leaves out those that its channels do not have. */
 static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t output)
 {
+    pdcp_audit_on_change(bus);
     bus->link.active = true;
     bus->link.at = PDCP_NONE;
     bus->link.kind = (uint8_t)kind;
@@ -286,6 +304,8 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
     bus->link.undoing = true;
     bus->link.once = false;
     bus->link.for_host = false;
+    bus->link.for_device = kind == PDCP_TODO_UPDATE;
+    bus->link.differs = false;
     bus->link.output_was_on = false;
     bus->link.status = PDCP_OK;
     pdcp_channel_t *channel = channel_of(bus, input);
@@ -299,6 +319,10 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
     if (kind == PDCP_TODO_CONNECT) {
         bus->link.step = STEP_OUTPUT_ID;
         name_source(bus, channel);
+    }
+    if (kind == PDCP_TODO_WRITE) {
+        bus->link.step = STEP_VID_PID;
+        bus->link.undoing = false;
     }
 }
 
@@ -351,8 +375,8 @@ static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
 static void settle_made(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     input->link = PDCP_LINK_ACTIVE;
-    drop_todo(input, PDCP_TODO_CONNECT | SILENCES); /* noted while it was being made */
-    release_output(bus, bus->link.old_feed);        /* unless it is the same: that one is needed */
+    drop_todo(input, PDCP_TODO_CONNECT | PDCP_TODO_WRITE | SILENCES); /* noted while it was being made */
+    release_output(bus, bus->link.old_feed); /* unless it is the same: that one is needed */
 }
 
 static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -371,21 +395,25 @@ static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
 static void end(pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = channel_of(bus, bus->link.input);
-    const bool made = bus->link.status == PDCP_OK;
+    const bool writes = bus->link.kind == PDCP_TODO_WRITE; /* what the tables say already */
     bus->link.active = false;
     bus->link.due = true;
-    if (bus->link.kind != PDCP_TODO_CONNECT && bus->link.kind != PDCP_TODO_UPDATE) {
+    if (bus->link.kind == PDCP_TODO_CONNECT || bus->link.kind == PDCP_TODO_UPDATE) {
+        if (bus->link.status == PDCP_OK) {
+            settle_made(bus, input);
+        } else {
+            settle_failed(bus, input);
+        }
+    } else if (!writes) {
         settle_silenced(bus, input);
-    } else if (made) {
-        settle_made(bus, input);
-    } else {
-        settle_failed(bus, input);
     }
-    if (bus->link.kind == PDCP_TODO_UPDATE && input != NULL && /* a device that was not read asks again */
+    if (bus->link.for_device && input != NULL && /* a device that was not read asks again */
         (bus->link.status != PDCP_ERR_NO_ANSWER || bus->link.step > STEP_READ_SERIAL)) {
-        answer_update(bus, input->node, input->index, made);
+        answer_update(bus, input->node, input->index, input->link == PDCP_LINK_ACTIVE);
     }
-    tell_outcome(bus);
+    if (!writes) {
+        tell_outcome(bus);
+    }
 }
 
 /* Nothing more is to be written forwards. Once the source was written, steps run backwards, the failed one
@@ -393,11 +421,12 @@ static void end(pdcp_bus_t *bus)
 static void give_up(pdcp_bus_t *bus, pdcp_status_t status)
 {
     pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    const bool writes = bus->link.kind == PDCP_TODO_WRITE;
     bus->link.status = (int8_t)status;
-    if (input != NULL) {
+    if (input != NULL && !writes) {
         give_back_old(bus, input);
     }
-    if (bus->link.step < STEP_VID_PID) {
+    if (bus->link.step < STEP_VID_PID || writes) {
         end(bus);
         return;
     }
@@ -413,7 +442,7 @@ static void resolve(pdcp_bus_t *bus)
         end(bus);
         return;
     }
-    input->link = is_unconnected(input) ? PDCP_LINK_NONE : PDCP_LINK_INACTIVE;
+    input->link = pdcp_nodes_is_named(input->source_index) ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE;
     take_old(bus, input);
     if (bus->link.output == PDCP_NONE) {
         if (input->enabled) {
@@ -427,15 +456,25 @@ static void resolve(pdcp_bus_t *bus)
     bus->link.step++;
 }
 
+/* Is the last step of the job done? Of an input without an active link no more is written than its source. */
+static bool is_done(pdcp_bus_t *bus)
+{
+    const bool silences = bus->link.kind == PDCP_TODO_SILENCE || bus->link.kind == PDCP_TODO_AGAIN;
+    const pdcp_channel_t *input = channel_of(bus, bus->link.input);
+    uint8_t last = STEP_OUTPUT_ON;
+    if (bus->link.undoing) {
+        return bus->link.step == (silences ? STEP_NODES : STEP_VID_PID);
+    }
+    if (bus->link.kind == PDCP_TODO_WRITE && (input == NULL || input->link != PDCP_LINK_ACTIVE)) {
+        last = STEP_TYPE;
+    }
+    return bus->link.step >= last;
+}
+
 /* Goes on to the step that comes next in the job's direction; behind the last one the job is over. */
 static void advance(pdcp_bus_t *bus)
 {
-    const bool silences = bus->link.kind == PDCP_TODO_SILENCE || bus->link.kind == PDCP_TODO_AGAIN;
-    uint8_t last = STEP_OUTPUT_ON;
-    if (bus->link.undoing) {
-        last = silences ? STEP_NODES : STEP_VID_PID;
-    }
-    if (bus->link.step == last) {
+    if (is_done(bus)) {
         end(bus);
     } else if (bus->link.undoing) {
         bus->link.step--;
@@ -507,9 +546,10 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
         }
         break;
     case STEP_OUTPUT_ID:
+    case STEP_OUTPUT_ID_AGAIN:
         *param = PDCP_OUT_NODE_ID;
         low = output->node_id;
-        len = 1;
+        len = bus->link.step == STEP_OUTPUT_ID || bus->link.kind == PDCP_TODO_WRITE ? 1 : 0;
         break;
     case STEP_INPUT_OFF:
         *param = PDCP_CH_ENABLED;
@@ -603,7 +643,11 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     pdcp_channel_t *channel = channel_of(bus, target_of(bus));
     if (bus->link.step <= STEP_READ_SERIAL) {
-        pdcp_nodes_take_source(channel, reply);
+        if (bus->link.kind == PDCP_TODO_UPDATE) {
+            pdcp_nodes_take_source(channel, reply);
+        } else if (!pdcp_nodes_is_source(channel, reply)) {
+            bus->link.differs = true;
+        }
     } else if (bus->link.step == STEP_INPUT_OFF || (bus->link.step >= STEP_INPUT_ON && bus->link.undoing)) {
         pdcp_link_is_disabled(bus, channel);
     } else if (bus->link.step == STEP_NODES && bus->link.undoing) {
@@ -611,10 +655,46 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     }
 }
 
+/* Update Data Channel while a stored configuration decides: 5 and 6 are read, and written if the device names
+ * something else (D-BUS-38). */
+static void look_at_source(pdcp_bus_t *bus)
+{
+    if (bus->link.step == STEP_READ_VID_PID) {
+        bus->link.step++;
+    } else if (bus->link.differs) {
+        bus->link.step = STEP_VID_PID;
+    } else {
+        end(bus);
+    }
+}
+
+/* What a device refuses is left out, and so is all else that is for a silent one: an audit finds what is
+ * still wrong (D-BUS-40). A device that cannot be read asks again. */
+static void leave_out(pdcp_bus_t *bus, pdcp_status_t status)
+{
+    const bool silent = status == PDCP_ERR_NO_ANSWER;
+    if (bus->link.step <= STEP_READ_SERIAL) {
+        if (silent) {
+            give_up(bus, status);
+        } else {
+            look_at_source(bus);
+        }
+        return;
+    }
+    if (silent) {
+        bus->link.step = bus->link.step < STEP_OUTPUT_ID_AGAIN ? STEP_INPUT_ON : STEP_OUTPUT_ON;
+    }
+    advance(bus);
+}
+
 /* A step was refused or not answered. */
 static void on_failure(pdcp_bus_t *bus, pdcp_status_t status)
 {
     const bool silent = status == PDCP_ERR_NO_ANSWER;
+    if (bus->link.kind == PDCP_TODO_WRITE) {
+        leave_out(bus, status);
+        return;
+    }
     if (bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output)) {
         pdcp_bind_take_output_id(
             bus, channel_of(bus, bus->link.output)); /* it may have it, and gets another one */
@@ -663,7 +743,9 @@ static void on_success(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     took_effect(bus, reply);
     bus->link.once = false;
-    if (bus->link.step == STEP_READ_SERIAL) {
+    if (bus->link.kind == PDCP_TODO_WRITE && bus->link.step <= STEP_READ_SERIAL) {
+        look_at_source(bus);
+    } else if (bus->link.step == STEP_READ_SERIAL) {
         resolve(bus);
     } else if (bus->link.undoing || bus->link.input != PDCP_NONE) { /* else run finds out, and gives up */
         advance(bus);
@@ -679,6 +761,18 @@ void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
         on_failure(bus, (pdcp_status_t)reply->status);
     }
     run(bus);
+}
+
+/* Begins to write what the tables say; for a device that has asked only if it names another source. */
+static void begin_writing(pdcp_bus_t *bus, uint8_t number, bool for_device)
+{
+    const pdcp_channel_t *input = &bus->nodes.channels[number];
+    const bool is_active = input->link == PDCP_LINK_ACTIVE;
+    begin(bus, PDCP_TODO_WRITE, number, is_active ? input->feed : (uint8_t)PDCP_NONE);
+    if (for_device) {
+        bus->link.for_device = true;
+        bus->link.step = STEP_READ_VID_PID;
+    }
 }
 
 /* Starts a job that a channel has to do, if it can be done now. */
@@ -700,13 +794,16 @@ static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
         input = PDCP_NONE;
         output = number;
     }
-    if (todo == PDCP_TODO_UPDATE && (input == PDCP_NONE || bus->link.stored)) {
-        /* its direction may not have been known when it came */
-        answer_update(bus, channel->node, channel->index, channel->link == PDCP_LINK_ACTIVE);
+    if (todo == PDCP_TODO_UPDATE && input == PDCP_NONE) { /* its direction was not known when it came */
+        answer_update(bus, channel->node, channel->index, false);
         return;
     }
     if (input == PDCP_NONE && output_is_needed(bus, number)) {
         return; /* by a link made meanwhile */
+    }
+    if (todo == PDCP_TODO_WRITE || (todo == PDCP_TODO_UPDATE && bus->link.stored)) {
+        begin_writing(bus, number, todo == PDCP_TODO_UPDATE);
+        return;
     }
     begin(bus, todo, input, output);
     if (todo == PDCP_TODO_REMOVE) {

@@ -153,6 +153,19 @@ void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
     }
 }
 
+bool pdcp_nodes_is_source(const pdcp_channel_t *input, const pdcp_reply_t *reply)
+{
+    const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
+    const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
+    if (reply->param == PDCP_IN_SOURCE_VID_PID) {
+        return input->source.vid == low && input->source.pid == high;
+    }
+    if (reply->param == PDCP_IN_SOURCE_SERIAL) {
+        return input->source.sn == low && input->source_index == (uint8_t)(high & 0xFFu);
+    }
+    return input->source_type == low && input->source_profile == high;
+}
+
 /* Makes a free entry of the pool, which is all 0 but for its node, a channel that nothing is known of. */
 static void make_channel(pdcp_channel_t *channel, uint8_t node, uint16_t index)
 {

@@ -66,7 +66,8 @@ typedef enum {
     PDCP_TODO_REMOVE = 2,  /* input: back to unconnected */
     PDCP_TODO_CONNECT = 4, /* input: make the link to the source that it has */
     PDCP_TODO_UPDATE = 8,  /* input: its device has sent Update Data Channel */
-    PDCP_TODO_AGAIN = 16   /* silence it: the write before was not answered, and everybody else comes first */
+    PDCP_TODO_WRITE = 16,  /* input: write what the tables say: its source, of an active link all of it */
+    PDCP_TODO_AGAIN = 32   /* silence it: the write before was not answered, and everybody else comes first */
 } pdcp_todo_t;
 
 typedef struct pdcp_channel {
@@ -128,6 +129,15 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input);
 
 /* Takes over a parameter that names the source of an input, 5, 6 or 8. */
 void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply);
+
+/* Does this channel index name a source? An unconnected input has FFh (D-BUS-7). */
+static inline bool pdcp_nodes_is_named(uint8_t index)
+{
+    return index != PDCP_NO_SOURCE_INDEX && index != 0;
+}
+
+/* Does a parameter that names the source of an input, 5, 6 or 8, say what the tables say? */
+bool pdcp_nodes_is_source(const pdcp_channel_t *input, const pdcp_reply_t *reply);
 
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */

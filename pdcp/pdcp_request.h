@@ -23,7 +23,8 @@ typedef enum {
     PDCP_CLIENT_HOST,
     PDCP_CLIENT_RAW, /* the host, with a frame that is sent as it is */
     PDCP_CLIENT_RESET,
-    PDCP_CLIENT_BIND /* is the device with this identity still there? */
+    PDCP_CLIENT_BIND, /* is the device with this identity still there? */
+    PDCP_CLIENT_AUDIT /* the audit's questions, and the Release of what somebody else has suspended */
 } pdcp_client_t;
 
 typedef enum {
@@ -34,7 +35,8 @@ typedef enum {
     PDCP_ERR_BUSY = -4,    /* not now: try again later */
     PDCP_ERR_UNKNOWN = -5, /* no such device or channel, or wrong direction */
     PDCP_ERR_OWN = -6,     /* an output never feeds an input of its own device (D-API-6) */
-    PDCP_ERR_SOLE = -7     /* another input wants the output for itself, as this one does (D-API-13) */
+    PDCP_ERR_SOLE = -7,    /* another input wants the output for itself, as this one does (D-API-13) */
+    PDCP_ERR_DIFFERS = -8  /* the device does not keep what it is told (D-BUS-40) */
 } pdcp_status_t;
 
 typedef enum {

@@ -244,6 +244,18 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
     return true;
 }
 
+/* What an input names as its source counts only while the arbitrator knows of no link: else the device is
+ * told what it should name (D-BUS-38). */
+static void take_source(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
+{
+    pdcp_channel_t *input = &bus->nodes.channels[number];
+    if (input->link == PDCP_LINK_NONE) {
+        pdcp_nodes_take_source(input, reply);
+    } else if (!pdcp_nodes_is_source(input, reply)) {
+        pdcp_link_write(bus, number);
+    }
+}
+
 /* Takes over a channel parameter; low, high: its numbers if it has some. False: the attempt has failed. */
 static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply, uint16_t low,
                          uint16_t high)
@@ -262,10 +274,14 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
     case PDCP_IN_TERMINAL_PROFILE:
         channel->terminal_profile = low;
         break;
-    default: /* its own idea of its source counts only while the arbitrator knows of no link */
-        if (reply->code == PDCP_GET_PARAMETER && channel->link == PDCP_LINK_NONE) {
-            pdcp_nodes_take_source(channel, reply);
+    case PDCP_IN_SOURCE_VID_PID: /* of an output: its node id was written */
+    case PDCP_IN_SOURCE_SERIAL:
+    case PDCP_IN_SOURCE_TYPE:
+        if (reply->code == PDCP_GET_PARAMETER) {
+            take_source(bus, number, reply);
         }
+        break;
+    default:
         break;
     }
     return true;

@@ -44,6 +44,7 @@ typedef enum {
     PDCP_STAT_DROP_SILENT,    /* everything but foreign beacons while on standby (D-BUS-12) */
     PDCP_STAT_TX_DISCARDED,   /* frames that waited while the bus was off */
     PDCP_STAT_BUS_OFF,        /* times that the controller went off the bus */
+    PDCP_STAT_AUDIT,          /* parameters of channels that were not as the tables say (D-BUS-40) */
     PDCP_STAT_COUNT
 } pdcp_stat_t;
 

@@ -16,6 +16,8 @@ enum {
     PDCP_TIMER_LINK,     /* links that were not answered are tried again */
     PDCP_TIMER_HOST,     /* the host's request or link has waited long enough for its turn */
     PDCP_TIMER_STANDBY,  /* standby: a bind request is not answered; else: the end of listening (D-BUS-42) */
+    PDCP_TIMER_AUDIT,    /* the next question of the audit */
+    PDCP_TIMER_RELEASE,  /* devices that somebody else has suspended are released */
     PDCP_TIMER_RECOVERY, /* the controller leaves bus-off */
     PDCP_TIMERS_MAX
 };

@@ -211,12 +211,12 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
     run->urgent = urgent;
 }
 
-/* The oldest of too many is tried again. */
-static void ban(profile_run_t *run, uint32_t now_ms)
+/* Leaves a pair out of plans for a while (D-PRO-14). The oldest of too many is tried again. */
+static void ban(profile_run_t *run, uint32_t now_ms, profile_pair_t pair)
 {
     memmove(&run->scene.banned[1], &run->scene.banned[0],
             sizeof run->scene.banned - sizeof run->scene.banned[0]);
-    run->scene.banned[0] = run->wish;
+    run->scene.banned[0] = pair;
     if (run->scene.banned_count < PROFILE_BANNED_MAX) {
         run->scene.banned_count++;
     }
@@ -255,7 +255,7 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
     }
     run->tries++;
     if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
-        ban(run, now_ms);
+        ban(run, now_ms, run->wish);
     }
     make_due(run, run->what);
 }
@@ -292,6 +292,16 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
         run->changed = true;
     }
     make_due(run, PROFILE_PLAN_SETTLE);
+}
+
+/* The audit has let the link of an input go: it counts as one that could not be made (D-PRO-14), and what
+ * requires the input rests (D-BUS-40). */
+static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
+{
+    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
+    run->plan.want[input] = PDCP_NONE;
+    ban(run, now_ms, pair);
+    make_due(run, run->at_events);
 }
 
 /* Did the last plan, which is done, want a link that does not work any more? While it is about to be made
@@ -352,7 +362,9 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         }
         break;
     case PDCP_EVENT_LINK:
-        if (event->channel != PDCP_NONE) {
+        if (event->status == PDCP_ERR_DIFFERS) {
+            on_let_go(run, now_ms, event->channel);
+        } else if (event->channel != PDCP_NONE) {
             on_link(run, arb, event->channel);
         }
         break;
@@ -467,6 +479,16 @@ bool profile_run_is_quiet(const profile_run_t *run, const pdcp_arb_t *arb, uint3
 
 /* --- Carrying a plan out --- */
 
+/* What an input without a link names as its source is not part of the configuration: it shall name none
+ * (D-BUS-38). */
+static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+{
+    profile_end_t source;
+    if (profile_source_of(run->scene.nodes, input, &source)) {
+        pdcp_arb_forget_source(arb, now_ms, input);
+    }
+}
+
 /* The link of an input is not to be: what the configuration has rests, what it has not goes. The host sees a
  * link of the configuration whose source is missing as inactive (D-BUS-10). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
@@ -484,6 +506,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
         original = output->index == channel->source_index && pdcp_identity_equal(owner, &channel->source);
     }
     if (channel->link == PDCP_LINK_NONE) {
+        forget_source(run, arb, now_ms, input);
         return;
     }
     if (channel->link == PDCP_LINK_ACTIVE) {

@@ -101,7 +101,8 @@ static void log_answer(bench_log_t *log, const can_frame_t *frame)
 /* A port that sends nothing hears every frame. */
 static void listen(void *ctx, uint64_t time_us, const can_frame_t *frame)
 {
-    bench_log_t *log = ctx;
+    bench_bus_t *bench = ctx;
+    bench_log_t *log = &bench->log;
     const unsigned own_us = sim_bus_frame_bits(frame);
     if (frame->dlc == 1 && frame->data[0] == PDCP_BEACON) {
         log->beacons++;
@@ -120,7 +121,9 @@ static void listen(void *ctx, uint64_t time_us, const can_frame_t *frame)
         log->bind_bus_us += own_us + SIM_BUS_INTERFRAME_BITS;
         log->bind_last_us = time_us;
     }
-    log_answer(log, frame);
+    if (!bench_bus_ready(bench)) { /* then answers are to questions of the audit */
+        log_answer(log, frame);
+    }
 }
 
 static void member_receives(void *ctx, uint64_t time_us, const can_frame_t *frame)
@@ -188,7 +191,7 @@ bool bench_bus_start(bench_bus_t *bench, uint8_t devices)
         }
     }
     bench->member_count = devices;
-    return sim_bus_attach(&bench->bus, listen, &bench->log) >= 0;
+    return sim_bus_attach(&bench->bus, listen, bench) >= 0;
 }
 
 uint32_t bench_bus_ms(const bench_bus_t *bench)

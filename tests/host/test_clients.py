@@ -167,6 +167,7 @@ ROWS: list[tuple[str, Operation, bytes, int, int, bytes, Any]] = [
     ("action", lambda c: c.action(Action.LOAD, 3), b"\x02\x03", 0x2407, 0x2408, b"\x02\x01", 0x0102),
     ("unlink", lambda c: c.unlink(INPUT), HAND_BYTES + b"\x02", 0x2410, 0x2411, b"", None),
     ("stream", lambda c: c.stream([EventKind.DEVICE_BOUND, EventKind.BUS_STATE]), b"\x21", 0x2416, 0x2417, b"", None),
+    ("stream audit", lambda c: c.stream([EventKind.AUDIT]), b"\x00\x01", 0x2416, 0x2417, b"", None),
     ("stream off", lambda c: c.stream([]), b"\x00", 0x2416, 0x2417, b"", None),
 ]
 
@@ -436,7 +437,7 @@ def test_events_come_with_answers(run: Run, arbitrator: Make) -> None:
 
         found = asyncio.run(listen())
     assert found == expected
-    assert peer.requests[0].payload == b"\x2f"  # all but CAN frames
+    assert peer.requests[0].payload == b"\x2f\x01"  # all but CAN frames
 
 
 def test_an_event_that_is_waited_for(run: Run, arbitrator: Make) -> None:

@@ -105,15 +105,25 @@ def test_wrong_sizes(number: int, message: Message, payload: str) -> None:
     """A byte too few or too many; those of any length take what there is."""
     data = bytes.fromhex(payload)
     open_end = number in (0x2302, 0x2304, 0x240B, 0x240D, 0x2414, 0x2419)
+    too_many = b"\0\0" if number == 0x2416 else b"\0"  # a mask of two bytes is one, too
     if not open_end:
         with pytest.raises(FormatError, match=f"{number:04X}h"):
-            unpack(Frame(number, 1, data + b"\0"))
+            unpack(Frame(number, 1, data + too_many))
     if data and not open_end:
         with pytest.raises(FormatError, match=f"{number:04X}h"):
             unpack(Frame(number, 1, data[:-1]))
     if number in (0x2414,):
         with pytest.raises(FormatError):
             unpack(Frame(number, 1, data[:-1]))
+
+
+def test_a_mask_of_two_bytes() -> None:
+    """D-API-20: 2416h takes a mask of 8 or 16 bits; what fits one byte is sent as one."""
+    assert m.StreamEvents(0x012F).pack() == b"\x2f\x01"
+    assert unpack(Frame(0x2416, 1, b"\x2f\x01")) == m.StreamEvents(0x012F)
+    assert unpack(Frame(0x2416, 1, b"\x2f\x00")) == m.StreamEvents(0x2F)
+    with pytest.raises(FormatError, match="mask: 65536"):
+        m.StreamEvents(0x10000).pack()
 
 
 @pytest.mark.parametrize("kind", [kind for kind in MESSAGES.values() if issubclass(kind, Request)])

@@ -265,7 +265,8 @@ EVENTS = [
     (5, "45 06 02 0A FF", events.CanFrame(5, 7, 0x645, b"\x0a\xff")),
     (5, "45 06 00", events.CanFrame(5, 7, 0x645, b"")),
     (6, "03 80 FF", events.BusStateChanged(6, 7, events.BusState.SILENT, 128, 255)),
-    (9, "01 02", events.UnknownEvent(9, 7, b"\x01\x02")),
+    (9, "02 00 02 00 06 00 02 07", events.AuditDifference(9, 7, ChannelId(HAND, 2), 7)),
+    (7, "01 02", events.UnknownEvent(7, 7, b"\x01\x02")),
 ]
 
 
@@ -278,7 +279,7 @@ def test_events(kind: int, data: str, event: events.Event) -> None:
 @pytest.mark.parametrize(
     ("kind", "data"),
     [(1, "02 00"), (2, ""), (3, "00" * 14), (3, "00" * 14 + "03"), (4, "01"), (5, "45 06 02 0A"), (5, "45"),
-     (5, "45 06 09" + "00" * 9), (6, "04 00 00"), (6, "00")],
+     (5, "45 06 09" + "00" * 9), (6, "04 00 00"), (6, "00"), (9, "00" * 7), (9, "00" * 9)],
 )  # fmt: skip
 def test_events_that_are_none(kind: int, data: str) -> None:
     with pytest.raises(FormatError, match=f"kind {kind}"):
@@ -287,4 +288,4 @@ def test_events_that_are_none(kind: int, data: str) -> None:
 
 def test_the_mask() -> None:
     """Bit k asks for kind k + 1."""
-    assert [kind.mask for kind in events.EventKind] == [1, 2, 4, 8, 16, 32]
+    assert [kind.mask for kind in events.EventKind] == [1, 2, 4, 8, 16, 32, 256]

@@ -57,7 +57,7 @@ typedef struct {
     uint16_t id;
     uint16_t len; /* of the payload */
     uint8_t reference;
-    uint8_t mask;      /* 2416h */
+    uint16_t mask;     /* 2416h */
     bool wrong_size;   /* must fail with 01h */
     bool last_piece;   /* 240Dh: with it the string is complete */
     uint32_t end_byte; /* of all that was ever sent: it is out when so many are taken */
@@ -79,8 +79,8 @@ typedef struct {
     uint32_t room; /* bytes that the line takes now */
     bool reads;
     bool is_open;
-    bool stale;   /* what comes may belong to the host before */
-    uint8_t mask; /* event stream, confirmed */
+    bool stale;    /* what comes may belong to the host before */
+    uint16_t mask; /* event stream, confirmed */
     uint8_t reference;
     /* The string of configurations that is being written in pieces. */
     uint8_t string[LIFE_STRING_MAX];
@@ -237,7 +237,8 @@ void life_check_silences(const limb_t *limb);
 /* When all has been calm: tables and devices agree, and nothing is under way. */
 void life_check_calm(const limb_t *limb);
 
-/* Is this a frame that a calm bus carries: a beacon, or data of an output that is linked? */
+/* Is this a frame that a calm bus carries: a beacon, data of an output that is linked, or a question of the
+ * audit and its answer? */
 bool life_check_is_calm_frame(const limb_t *limb, const can_frame_t *frame);
 
 #endif

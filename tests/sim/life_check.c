@@ -226,6 +226,23 @@ static void check_input(const limb_t *limb, const limb_part_t *part, const pdcp_
     }
 }
 
+/* An input names the source that it has in the tables, or none (D-BUS-38). Not one that has refused to tell:
+ * it is not asked again before it is set up again. */
+static void check_source(const limb_t *limb, const limb_part_t *part, const pdcp_channel_t *input)
+{
+    const uint8_t number = (uint8_t)(input - nodes_of(limb)->channels);
+    const pdcp_device_source_t *named = pdcp_device_source(sim_node_device(part->node), input->index);
+    const bool names_one = named->channel != PDCP_NO_SOURCE_INDEX && named->channel != 0;
+    const bool has_source = input->link != PDCP_LINK_NONE;
+    if (pdcp_bit(limb->app.arb.bus.audit.refused[PDCP_IN_SOURCE_SERIAL - PDCP_AUDIT_FIRST], number)) {
+        return;
+    }
+    if (names_one != has_source || (has_source && (!pdcp_identity_equal(&named->identity, &input->source) ||
+                                                   named->channel != input->source_index))) {
+        complain(limb, part, input->index, "names another source than the tables");
+    }
+}
+
 static void check_channel(const limb_t *limb, const limb_part_t *part, uint8_t index)
 {
     const pdcp_channel_t *channel = find_channel(limb, part, index);
@@ -242,6 +259,9 @@ static void check_channel(const limb_t *limb, const limb_part_t *part, uint8_t i
         check_input(limb, part, channel);
     } else if (enabled) {
         complain(limb, part, index, "listens without a link");
+    }
+    if (channel->transfer == PDCP_INPUT) {
+        check_source(limb, part, channel);
     }
     if (channel->todo != PDCP_TODO_NONE) {
         complain(limb, part, index, "something is still to be done");
@@ -271,10 +291,22 @@ void life_check_calm(const limb_t *limb)
                              "the profile layer has not started");
 }
 
+/* A question of the audit, or its answer (D-BUS-40): reading 4 to 7 of a channel. */
+static bool is_audit(const can_frame_t *frame)
+{
+    const bool asks = (frame->id & 0x700u) == 0x300 && frame->dlc == 3 && frame->data[0] == 0x03;
+    const bool answers = (frame->id & 0x700u) == 0x200 && frame->dlc >= 4 && frame->data[0] == 0x83;
+    const uint8_t *what = &frame->data[asks ? 1 : 2]; /* parameter, channel index */
+    return (asks || answers) && what[0] >= PDCP_CH_ENABLED && what[0] <= PDCP_IN_SOURCE_NODES && what[1] != 0;
+}
+
 bool life_check_is_calm_frame(const limb_t *limb, const can_frame_t *frame)
 {
     const uint8_t id = (uint8_t)(frame->id & 0xFFu);
     if (frame->dlc == 1 && frame->data[0] == PDCP_BEACON && (frame->id == 0x100 || frame->id == id)) {
+        return true;
+    }
+    if (is_audit(frame)) {
         return true;
     }
     for (int i = 0; i < PDCP_CHANNELS_MAX && frame->id == id; i++) {

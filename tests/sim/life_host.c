@@ -199,8 +199,13 @@ static uint16_t ask_statistics(life_host_t *host, const limb_t *limb, uint8_t *p
 static uint16_t ask_stream(life_host_t *host, const limb_t *limb, uint8_t *payload)
 {
     (void)limb;
-    payload[0] = (uint8_t)(life_chance(&host->random, 30) ? 0 : chance(host, 66));
-    return 1;
+    const bool is_wide = life_chance(&host->random, 50);
+    uint16_t mask = (uint16_t)(life_chance(&host->random, 30) ? 0 : chance(host, 66));
+    if (is_wide && life_chance(&host->random, 80)) {
+        mask |= 0x100;
+    }
+    arb_host_put_u16(payload, mask);
+    return is_wide ? 2 : 1;
 }
 
 /* --- A string of configurations, in pieces --- */
@@ -375,8 +380,9 @@ static bool make_size_wrong(life_host_t *host, uint16_t id, uint8_t *payload, ui
     if (id == ARB_MSG_SET_PARAMETER || id == ARB_MSG_WRITE_CONFIGS) {
         *len = 4; /* these have no upper limit that is near */
     } else {
-        payload[*len] = 0;
-        (*len)++;
+        const uint16_t more = id == ARB_MSG_EVENT_STREAM ? 2 : 1; /* a mask of two bytes is one, too */
+        memset(&payload[*len], 0, more);
+        *len = (uint16_t)(*len + more);
     }
     return true;
 }
@@ -402,7 +408,7 @@ void life_host_ask(life_host_t *host, const limb_t *limb)
         request->last_piece = false;
         host->string_at = 0;
     }
-    request->mask = payload[0];
+    request->mask = request->len == 2 ? arb_host_get_u16(payload) : payload[0];
     request->reference = next_reference(host);
     const uint16_t total = arb_host_finish(bytes, request->id, request->reference, request->len);
     put_bytes(host, bytes, total);
@@ -583,9 +589,9 @@ static void take_open(life_host_t *host, int k)
 }
 
 /* Kinds that are wanted, or may be by a request that is not answered yet. */
-static uint8_t wanted_mask(const life_host_t *host)
+static uint16_t wanted_mask(const life_host_t *host)
 {
-    uint8_t mask = host->mask;
+    uint16_t mask = host->mask;
     for (int i = 0; i < host->open_count; i++) {
         mask |= host->open[i].id == ARB_MSG_EVENT_STREAM ? host->open[i].mask : 0;
     }
@@ -596,7 +602,7 @@ static void on_event(life_host_t *host, uint8_t reference, const uint8_t *payloa
 {
     host->events++;
     TEST_ASSERT_EQUAL_MESSAGE(0, reference, "reference of an event");
-    TEST_ASSERT_TRUE_MESSAGE(len >= 5 && payload[0] >= 1 && payload[0] <= 6, "an event of no kind");
+    TEST_ASSERT_TRUE_MESSAGE(len >= 5 && payload[0] >= 1 && payload[0] <= 9, "an event of no kind");
     TEST_ASSERT_TRUE_MESSAGE(host->stale || ((unsigned)wanted_mask(host) << 1 & 1u << payload[0]) != 0,
                              "an event that nobody has asked for");
 }

@@ -15,7 +15,7 @@
 enum {
     LIVES = 250,
     STORM_MS = 30000,
-    CALM_MS = 40000, /* whatever is tried again after a while has been */
+    CALM_MS = 66000, /* what is tried again after a while has been, and an audit's minute is over */
     WATCH_MS = 2500,
     PARTS_MAX = 8,
     CLONES = 2, /* of the first parts */

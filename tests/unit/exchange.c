@@ -72,6 +72,8 @@ void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, c
     x->arb = &app->arb;
     arb_app_init(app, port, settings, x->now_ms);
     arb_app_observe(app, on_event, x);
+    app->arb.bus.audit.on = false;
+    pdcp_timers_cancel(&app->arb.bus.timers, PDCP_TIMER_AUDIT);
     pass_first_time(x);
 }
 

@@ -24,7 +24,8 @@ typedef struct {
 void exchange_start(exchange_t *x, uint32_t now_ms);
 
 /* The same with a whole application, whose port's can_send must refuse: its frames are taken from its queue.
- */
+ * Neither asks by itself whether devices still have what they should (D-BUS-40): that would disturb tests of
+ * other things; pdcp_arb_audit begins it. */
 void exchange_start_app(exchange_t *x, arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings,
                         uint32_t now_ms);
 

@@ -165,6 +165,54 @@ static void test_the_bus_has_another_state(void)
     hostlink_silence();
 }
 
+/* D-API-20, D-BUS-40: an audit finds a channel whose parameter is not what it should be. */
+static void test_the_audit_finds_a_difference(void)
+{
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    make_link();
+    hostlink_answer(0x2308, 7, BYTES(2));
+    hostlink_ask(&x, 0x2416, 1, BYTES(0x00, 0x01));
+    hostlink_answer(0x2417, 1, NULL, 0);
+    pdcp_arb_audit(&app.arb, x.now_ms);
+    app.work = true;
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "311#03 04 01");
+    exchange_rx(&x, "211#83 01 04 01 01");
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "312#03 04 01");
+    exchange_rx(&x, "212#83 01 04 01 01");
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "311#03 05 01");
+    exchange_rx(&x, "211#83 01 05 01 33");
+    expect_event(BYTES(9, 0xB9, 0xFF, 0xFF, 0xFF, DEV_OUT, 1, 5)); /* 5 ms of D-BUS-42 and 3 times 60 */
+    hostlink_silence();
+}
+
+/* D-API-20: a mask has 8 or 16 bits. There are the kinds 1 to 6 and 9: bits 0 to 5 and 8. */
+static void test_masks_of_both_sizes(void)
+{
+    static const uint16_t wrong[] = {0x0040, 0x0080, 0x0200, 0x8000, 0x0141, 0xFFFF};
+    for (unsigned i = 0; i < sizeof wrong / sizeof wrong[0]; i++) {
+        hostlink_ask(&x, 0x2416, 1, BYTES((uint8_t)(wrong[i] & 0xFFu), (uint8_t)(wrong[i] >> 8)));
+        hostlink_answer(0x2418, 1, BYTES(0x0F));
+    }
+    hostlink_ask(&x, 0x2416, 2, BYTES(0x3F, 0x01));
+    hostlink_answer(0x2417, 2, NULL, 0);
+    TEST_ASSERT_EQUAL_HEX16(0x013F, app.api.events.mask);
+    hostlink_ask(&x, 0x2416, 3, BYTES(0x10, 0x00));
+    hostlink_answer(0x2417, 3, NULL, 0);
+    TEST_ASSERT_EQUAL_HEX16(0x0010, app.api.events.mask);
+    hostlink_ask(&x, 0x2416, 4, BYTES(0x10, 0x00, 0x00));
+    hostlink_answer(0x2418, 4, BYTES(0x01));
+    hostlink_ask(&x, 0x2416, 5, NULL, 0);
+    hostlink_answer(0x2418, 5, BYTES(0x01));
+    TEST_ASSERT_EQUAL_HEX16(0x0010, app.api.events.mask);
+    hostlink_ask(&x, 0x2416, 6, BYTES(0x20)); /* one byte takes kind 9 away */
+    hostlink_answer(0x2417, 6, NULL, 0);
+    TEST_ASSERT_EQUAL_HEX16(0x0020, app.api.events.mask);
+}
+
 static void test_masks(void)
 {
     hostlink_ask(&x, 0x2416, 1, BYTES(0x40));
@@ -409,7 +457,9 @@ int main(void)
     RUN_TEST(test_frames);
     RUN_TEST(test_frames_that_are_sent);
     RUN_TEST(test_the_bus_has_another_state);
+    RUN_TEST(test_the_audit_finds_a_difference);
     RUN_TEST(test_masks);
+    RUN_TEST(test_masks_of_both_sizes);
     RUN_TEST(test_what_waits_when_the_mask_changes);
     RUN_TEST(test_no_message_is_torn_and_answers_go_first);
     RUN_TEST(test_no_message_is_torn_by_a_driver_that_takes_little);

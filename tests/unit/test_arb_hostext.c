@@ -486,7 +486,7 @@ static void test_statistics_of_the_bus(void)
 /* The order stands in arb_hostext.h. */
 static void test_statistics_of_the_host_link(void)
 {
-    enum { COUNTERS = 17 };
+    enum { COUNTERS = 20 };                                /* events dropped of kind 1 to 9 stand last */
     hostlink_send(&x, "00 00 00");                         /* garbage */
     hostlink_send(&x, "FE 19 01 22 07 00 00 00");          /* wrong CRC8 */
     hostlink_send(&x, "FE 19 04 22 04 F9 03 00 03 93 D0"); /* wrong CRC16 */

@@ -547,6 +547,8 @@ static void test_update_data_channel_does_not_keep_an_input_from_being_silenced(
         {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
         {"313#04 04 01 00", "213#84 01 04 01 00"},
         {"313#04 07 01 00 00", "213#84 01 07 01 00 00"},
+        {"313#03 05 01", "213#83 01 05 01 0200 0200"}, /* D-BUS-38: does it name what it should? */
+        {"313#03 06 01", "213#83 01 06 01 0400 01"},
         {"313#8F 00 01", NULL},
         {NULL, NULL},
     };
@@ -574,6 +576,10 @@ static void test_update_data_channel_does_not_end_the_silencing(void)
         exchange_pass(&x, i < 3 ? 100 : 50);
     }
     exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01"); /* D-BUS-38: does it name what it should? */
+    exchange_rx(&x, "212#83 01 05 01 0200 0200");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
     exchange_tx(&x, "312#8F 00 01");
     exchange_tx(&x, "312#04 04 01 00");
     exchange_rx(&x, "212#84 01 04 01 00");

@@ -330,6 +330,13 @@ static void do_reset(replay_t *replay, char *words[], size_t count)
     must(replay, pdcp_arb_reset(&replay->arb, clock_ms(replay), place_of(replay, words[1], '\0')));
 }
 
+static void do_audit(replay_t *replay, char *words[], size_t count)
+{
+    (void)words;
+    (void)count;
+    pdcp_arb_audit(&replay->arb, clock_ms(replay));
+}
+
 /* VID:PID:SN */
 static void do_remember(replay_t *replay, char *words[], size_t count)
 {
@@ -374,6 +381,7 @@ static void do_in_service(replay_t *replay, char *words[], size_t count)
     if (nodes->nodes[PDCP_DEVICES_MAX - 1].state == PDCP_NODE_FREE) {
         pdcp_nodes_add(nodes, PDCP_DEVICES_MAX - 1, &identity, 0xC8);
         nodes->nodes[PDCP_DEVICES_MAX - 1].state = PDCP_NODE_READY;
+        nodes->nodes[PDCP_DEVICES_MAX - 1].ack_ms = PDCP_ACK_MS;
     }
 }
 
@@ -450,6 +458,7 @@ static const action_t actions[] = {
     {"suspend", 3, 0, true, do_suspend},   {"release", 2, 0, true, do_release},
     {"reset", 2, 0, true, do_reset},       {"remember", 3, 0, true, do_remember},
     {"full-bus", 1, 0, true, do_full_bus}, {"in-service", 1, 0, false, do_in_service},
+    {"audit", 1, 0, true, do_audit},
 };
 
 /* Lines */

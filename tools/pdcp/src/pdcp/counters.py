@@ -52,6 +52,7 @@ BUS = Group(
         ("drop_silent", "dropped: on standby"),
         ("tx_discarded", "frames discarded when the bus went off"),
         ("bus_off", "times off the bus"),
+        ("audit", "parameters of channels that were not as they should be"),
     ),
 )
 
@@ -75,6 +76,9 @@ HOST = Group(
         ("dropped_configuration", "events dropped: configuration changed"),
         ("dropped_frame", "events dropped: CAN frame"),
         ("dropped_bus_state", "events dropped: bus state"),
+        ("dropped_7", "events dropped: kind 7, which there is not yet"),
+        ("dropped_8", "events dropped: kind 8, which there is not yet"),
+        ("dropped_audit", "events dropped: audit"),
     ),
 )
 

@@ -17,6 +17,7 @@ class EventKind(IntEnum):
     CONFIGURATION_CHANGED = 4
     CAN_FRAME = 5
     BUS_STATE = 6
+    AUDIT = 9
 
     @property
     def mask(self) -> int:
@@ -85,6 +86,14 @@ class BusStateChanged(Event):
 
 
 @dataclass(frozen=True, slots=True)
+class AuditDifference(Event):
+    """A channel did not have what the arbitrator's tables say in this parameter; it is repaired (D-BUS-40)."""
+
+    channel: ChannelId
+    parameter: int
+
+
+@dataclass(frozen=True, slots=True)
 class UnknownEvent(Event):
     """A kind that this package does not know."""
 
@@ -114,6 +123,11 @@ def _bus_state(data: bytes) -> tuple[BusState, int, int]:
     return BusState(state), transmit_errors, receive_errors
 
 
+def _audit(data: bytes) -> tuple[ChannelId, int]:
+    *identity, index, parameter = struct.unpack("<HHHBB", data)
+    return ChannelId(Identity(*identity), index), parameter
+
+
 def parse(message: EventMessage) -> Event:
     """What an event message says. Raises FormatError when its data do not fit its kind."""
     kind, time_ms, data = message.kind, message.time_ms, message.data
@@ -132,6 +146,8 @@ def parse(message: EventMessage) -> Event:
                 return CanFrame(kind, time_ms, *_frame(data))
             case EventKind.BUS_STATE:
                 return BusStateChanged(kind, time_ms, *_bus_state(data))
+            case EventKind.AUDIT:
+                return AuditDifference(kind, time_ms, *_audit(data))
             case _:
                 return UnknownEvent(kind, time_ms, data)
     except (struct.error, ValueError):

@@ -100,11 +100,22 @@ class _Counters:
         return struct.unpack(f"<{len(data) // 4}I", data), len(data)
 
 
-_Codec = _Unsigned | _Device | _ChannelOfDevice | _Bytes | _Counters
+class _Mask:
+    """One byte where that is enough, else two (D-API-20)."""
+
+    def pack(self, value: int) -> bytes:
+        return _Unsigned(1 if 0 <= value <= 0xFF else 2).pack(value)
+
+    def take(self, data: bytes) -> tuple[int, int]:
+        return _Unsigned(min(max(len(data), 1), 2)).take(data)
+
+
+_Codec = _Unsigned | _Mask | _Device | _ChannelOfDevice | _Bytes | _Counters
 
 U8 = Annotated[int, _Unsigned(1)]
 U16 = Annotated[int, _Unsigned(2)]
 U32 = Annotated[int, _Unsigned(4)]
+Mask = Annotated[int, _Mask()]
 Dev = Annotated[Identity, _Device()]
 Chan = Annotated[ChannelId, _ChannelOfDevice()]
 Octets = Annotated[bytes, _Bytes(8)]
@@ -496,7 +507,7 @@ class StatisticsFailure(Failure, id=0x2415):
 
 @dataclass(frozen=True)
 class StreamEvents(Request["StreamEventsSuccess"], id=0x2416):
-    mask: U8
+    mask: Mask
 
 
 @dataclass(frozen=True)

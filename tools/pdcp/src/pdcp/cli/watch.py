@@ -19,6 +19,7 @@ from ..errors import PdcpError
 from ..events import (
     ALL_KINDS,
     QUIET_KINDS,
+    AuditDifference,
     BusState,
     BusStateChanged,
     CanFrame,
@@ -62,6 +63,8 @@ def describe(event: Event) -> tuple[str, str, str]:
         case BusStateChanged():
             errors = f"errors: {event.transmit_errors} transmitting, {event.receive_errors} receiving"
             return f"bus {event.state.name.lower()}", errors, BUS_STYLES[event.state]
+        case AuditDifference():
+            return "audit", f"{event.channel} had a wrong parameter {event.parameter}", "yellow"
         case UnknownEvent():
             return f"kind {event.kind}", event.data.hex(" "), "yellow"
     raise AssertionError(event)
@@ -84,6 +87,8 @@ def event_json(event: Event) -> Json:
         case BusStateChanged():
             errors = {"transmit_errors": event.transmit_errors, "receive_errors": event.receive_errors}
             return head | {"event": "bus_state", "state": event.state.name.lower(), **errors}
+        case AuditDifference():
+            return head | {"event": "audit", "channel": str(event.channel), "parameter": event.parameter}
         case UnknownEvent():
             return head | {"event": "unknown", "data": event.data.hex()}
     raise AssertionError(event)

@@ -1,0 +1,270 @@
+#include "pdcp_audit.h"
+
+#include <string.h>
+
+#include "pdcp_bus.h"
+
+enum {
+    SPARE_EVERY = 4,                   /* of so many questions one is for a channel without a link */
+    WINDOW = 60000 / PDCP_AUDIT_MS,    /* a minute */
+    TOO_MANY = PDCP_AUDIT_REPAIRS + 2, /* differences, of which the host is told no more */
+    WALK_END = PDCP_AUDIT_PARAMS * PDCP_CHANNELS_MAX
+};
+
+void pdcp_audit_begin(pdcp_bus_t *bus)
+{
+    bus->audit.on = true;
+    pdcp_bus_wake(bus, PDCP_TIMER_AUDIT, PDCP_AUDIT_MS);
+}
+
+void pdcp_audit_init(pdcp_bus_t *bus)
+{
+    const bool on = bus->audit.on;
+    memset(&bus->audit, 0, sizeof bus->audit);
+    bus->audit.asked = PDCP_NONE;
+    bus->audit.at[PDCP_AUDIT_HURRY] = WALK_END;
+    if (on) {
+        pdcp_audit_begin(bus);
+    }
+}
+
+void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node)
+{
+    for (uint16_t at = 0; at < WALK_END; at++) {
+        const uint8_t number = (uint8_t)(at % PDCP_CHANNELS_MAX);
+        if (bus->nodes.channels[number].node == node) {
+            pdcp_set_bit(bus->audit.refused[at / PDCP_CHANNELS_MAX], number, false);
+        }
+    }
+}
+
+void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
+{
+    uint8_t node;
+    if (pdcp_nodes_owner(&bus->nodes, node_id, &node) && node != PDCP_NONE) {
+        pdcp_set_bit(bus->audit.hurried, node, true);
+    }
+}
+
+void pdcp_audit_on_change(pdcp_bus_t *bus)
+{
+    bus->audit.asked = PDCP_NONE;
+}
+
+/* --- Questions --- */
+
+static bool is_output(const pdcp_channel_t *channel)
+{
+    return channel->transfer == PDCP_OUTPUT;
+}
+
+/* Does this parameter tell what an input names as its source? Of an output, 5 is its node id. */
+static bool names_source(const pdcp_channel_t *channel, uint8_t param)
+{
+    return !is_output(channel) && (param == PDCP_IN_SOURCE_VID_PID || param == PDCP_IN_SOURCE_SERIAL);
+}
+
+/* Is the channel an end of an active link? */
+static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
+{
+    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    if (!is_output(channel)) {
+        return channel->link == PDCP_LINK_ACTIVE;
+    }
+    return channel->enabled && pdcp_link_listener(bus, number) != PDCP_NONE;
+}
+
+/* Is the channel of no active link, and silent as far as is known? */
+static bool is_spare(const pdcp_channel_t *channel)
+{
+    return !channel->enabled && channel->link != PDCP_LINK_ACTIVE;
+}
+
+/* Is the input to be asked for this parameter, which names its source? Without a link it must name none,
+ * which parameter 6 tells, but not while the tables have one for it: whether it gets that link is still to be
+ * decided. */
+static bool is_source_asked(const pdcp_channel_t *input, uint8_t param)
+{
+    return input->link != PDCP_LINK_NONE ||
+           (param == PDCP_IN_SOURCE_SERIAL && !pdcp_nodes_is_named(input->source_index));
+}
+
+/* Is this parameter of the channel asked on this walk? */
+static bool is_asked(const pdcp_bus_t *bus, uint8_t number, uint8_t param, pdcp_audit_walk_t walk)
+{
+    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    if (walk != PDCP_AUDIT_TURN && param == PDCP_CH_ENABLED && is_spare(channel)) {
+        return true;
+    }
+    if (walk == PDCP_AUDIT_SPARE) {
+        return false;
+    }
+    if (names_source(channel, param)) {
+        return bus->link.planned && is_source_asked(channel, param);
+    }
+    return param <= (is_output(channel) ? PDCP_OUT_NODE_ID : PDCP_IN_SOURCE_NODES) && is_linked(bus, number);
+}
+
+static bool may_ask(pdcp_bus_t *bus, uint8_t node)
+{
+    return node != PDCP_NONE && pdcp_bus_node(bus, node)->state == PDCP_NODE_READY &&
+           pdcp_request_is_idle(bus, node);
+}
+
+/* Asks what comes next on a walk. False: it is at its end, and begins anew. */
+static bool ask_on(pdcp_bus_t *bus, pdcp_audit_walk_t walk)
+{
+    pdcp_audit_t *audit = &bus->audit;
+    while (audit->at[walk] < WALK_END) {
+        const uint8_t number = (uint8_t)(audit->at[walk] % PDCP_CHANNELS_MAX);
+        const uint8_t kind = (uint8_t)(audit->at[walk] / PDCP_CHANNELS_MAX);
+        const uint8_t param = (uint8_t)(PDCP_AUDIT_FIRST + kind);
+        const pdcp_channel_t *channel = &bus->nodes.channels[number];
+        audit->at[walk]++;
+        if ((walk != PDCP_AUDIT_HURRY || channel->node == audit->first) && may_ask(bus, channel->node) &&
+            !pdcp_bit(audit->refused[kind], number) && is_asked(bus, number, param, walk)) {
+            audit->asked = number;
+            audit->asked_place = channel->node;
+            pdcp_request_get(bus, channel->node, PDCP_CLIENT_AUDIT, channel->index, param, PDCP_VALUE_MAX);
+            pdcp_request_limit_tries(bus, channel->node, 1);
+            return true;
+        }
+    }
+    audit->at[walk] = 0;
+    return false;
+}
+
+/* Asks what comes next of the devices that go first, one after the other. */
+static bool ask_hurried(pdcp_bus_t *bus)
+{
+    pdcp_audit_t *audit = &bus->audit;
+    for (uint8_t i = 0; i <= PDCP_DEVICES_MAX; i++) {
+        if (audit->at[PDCP_AUDIT_HURRY] != WALK_END && ask_on(bus, PDCP_AUDIT_HURRY)) {
+            return true;
+        }
+        audit->first = (uint8_t)((audit->first + 1u) % PDCP_DEVICES_MAX);
+        audit->at[PDCP_AUDIT_HURRY] = pdcp_bit(audit->hurried, audit->first) ? 0 : WALK_END;
+        pdcp_set_bit(audit->hurried, audit->first, false);
+    }
+    return false;
+}
+
+/* Each second question at most is for a device that goes first: however many frames somebody else sends, the
+ * others have their turn. */
+static void ask_next(pdcp_bus_t *bus)
+{
+    const uint8_t count = bus->audit.count++;
+    const bool is_spare_due = count % SPARE_EVERY == SPARE_EVERY - 1;
+    if ((is_spare_due && (ask_on(bus, PDCP_AUDIT_SPARE) || ask_on(bus, PDCP_AUDIT_SPARE))) ||
+        (count % 2 == 0 && ask_hurried(bus)) || ask_on(bus, PDCP_AUDIT_TURN)) {
+        return;
+    }
+    (void)ask_on(bus, PDCP_AUDIT_TURN);
+}
+
+static bool is_asking(pdcp_bus_t *bus)
+{
+    const uint8_t node = bus->audit.asked_place;
+    return !pdcp_request_is_idle(bus, node) && pdcp_bus_node(bus, node)->request.client == PDCP_CLIENT_AUDIT;
+}
+
+void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
+{
+    pdcp_audit_t *audit = &bus->audit;
+    pdcp_bus_wake(bus, PDCP_TIMER_AUDIT, PDCP_AUDIT_MS);
+    if (audit->window != 0 && --audit->window == 0) {
+        memset(audit->found, 0, sizeof audit->found);
+    }
+    if (calm && !is_asking(bus)) {
+        ask_next(bus);
+    }
+}
+
+/* --- Answers --- */
+
+/* Does the value say what the tables say? */
+static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
+{
+    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const uint8_t first = pdcp_value_u8(reply->bytes, reply->len, 0);
+    if (reply->param == PDCP_CH_ENABLED) {
+        return (first != 0) == is_linked(bus, number);
+    }
+    if (is_output(channel)) {
+        return first == channel->node_id;
+    }
+    if (reply->param == PDCP_IN_SOURCE_NODES) {
+        const pdcp_channel_t *source = &bus->nodes.channels[channel->feed];
+        return first == pdcp_bus_node(bus, source->node)->node_id &&
+               pdcp_value_u8(reply->bytes, reply->len, 1) == source->node_id;
+    }
+    return channel->link != PDCP_LINK_NONE ? pdcp_nodes_is_source(channel, reply)
+                                           : !pdcp_nodes_is_named(pdcp_value_u8(reply->bytes, reply->len, 2));
+}
+
+/* Counts a difference. Returns how many of its kind there are in the minute under way, which begins with the
+ * first one; no more than TOO_MANY. When too many channels differ, the last entry counts anew for each of
+ * them. */
+static uint8_t count_difference(pdcp_audit_t *audit, uint8_t number, bool source)
+{
+    pdcp_audit_found_t *entry = audit->found;
+    const pdcp_audit_found_t *last = &audit->found[PDCP_AUDIT_FOUND_MAX - 1];
+    while (entry != last && entry->times != 0 && (entry->channel != number || entry->source != source)) {
+        entry++;
+    }
+    if (entry->channel != number || entry->source != source) {
+        *entry = (pdcp_audit_found_t){.channel = number, .source = source};
+    }
+    if (entry->times < TOO_MANY) {
+        entry->times++;
+    }
+    if (audit->window == 0) {
+        audit->window = WINDOW;
+    }
+    return entry->times;
+}
+
+/* A link cannot be kept. What the device does not keep is the input's, or the output's, which may feed
+ * several. */
+static void let_go(pdcp_bus_t *bus, uint8_t number, uint8_t input)
+{
+    while (input != PDCP_NONE) {
+        pdcp_link_rest(bus, input, PDCP_ERR_DIFFERS);
+        input = pdcp_link_listener(bus, number);
+    }
+}
+
+/* Repairs what differs. An output stands for the first of its links. */
+static void on_difference(pdcp_bus_t *bus, uint8_t number, uint8_t param)
+{
+    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const bool linked = is_linked(bus, number);
+    const bool source = names_source(channel, param);
+    const uint8_t input = is_output(channel) && linked ? pdcp_link_listener(bus, number) : number;
+    const uint8_t times = count_difference(&bus->audit, input, source);
+    pdcp_bus_count(bus, PDCP_STAT_AUDIT);
+    if (times < TOO_MANY) {
+        pdcp_bus_tell_audit(bus, number, param);
+    }
+    if (!linked && !source) {
+        pdcp_link_silence(bus, number);
+    } else if (times <= PDCP_AUDIT_REPAIRS) {
+        pdcp_link_write(bus, input);
+    } else if (!source) {
+        let_go(bus, number, input);
+    }
+}
+
+void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
+{
+    const uint8_t number = bus->audit.asked;
+    if (reply->code != PDCP_GET_PARAMETER || number == PDCP_NONE || reply->status == PDCP_ERR_NO_ANSWER) {
+        return; /* a Release; or nothing can be said */
+    }
+    bus->audit.asked = PDCP_NONE;
+    if (reply->status != PDCP_OK) {
+        pdcp_set_bit(bus->audit.refused[reply->param - PDCP_AUDIT_FIRST], number, true);
+    } else if (!agrees(bus, number, reply)) {
+        on_difference(bus, number, reply->param);
+    }
+}

@@ -1,0 +1,44 @@
+/* Suspended devices (pdcp-bus.md 9): what the host has suspended stays so, what somebody else has suspended
+ * is released (D-BUS-40).
+ *
+ * Nobody but the arbitrator sends Suspend, and it does so only for its host. A Suspend of somebody else stops
+ * data that the tables call active. Release follows some milliseconds later, so that many Suspends lead to
+ * few Releases. */
+#ifndef PDCP_SUSPEND_H
+#define PDCP_SUSPEND_H
+
+#include <stdint.h>
+
+#include "pdcp_bits.h"
+#include "pdcp_limits.h"
+
+struct pdcp_bus;
+
+enum {
+    PDCP_SUSPENDED_FOR_GOOD = 0xFF, /* until released */
+    PDCP_RELEASE_MS = 10 /* from somebody else's Suspend to the Release, and to the next Releases */
+};
+
+/* All 0: nobody is suspended. */
+typedef struct {
+    uint8_t left[PDCP_DEVICES_MAX]; /* by place, suspended by the host: beacons of the arbitrator until that
+                                       is over, up to 133, or PDCP_SUSPENDED_FOR_GOOD; 0: not suspended, or
+                                       nobody is there */
+    uint8_t release[PDCP_BIT_BYTES(
+        PDCP_DEVICES_MAX)]; /* set of places: to be told Release, if bound and left is 0 */
+} pdcp_suspend_t;
+
+/* The host has sent Suspend, for time_ms, 0: until released, or Release; to a device or (PDCP_NONE) to all.
+ */
+void pdcp_suspend_on_host(struct pdcp_bus *bus, uint8_t node, uint8_t code, uint16_t time_ms);
+
+/* Somebody else has sent Suspend to this node id, 0: to all. */
+void pdcp_suspend_on_foreign(struct pdcp_bus *bus, uint8_t node_id);
+
+/* A beacon of the arbitrator leaves: half a second has passed. */
+void pdcp_suspend_on_beacon(struct pdcp_bus *bus);
+
+/* PDCP_TIMER_RELEASE is due: devices are told Release as their places are free. */
+void pdcp_suspend_on_deadline(struct pdcp_bus *bus);
+
+#endif

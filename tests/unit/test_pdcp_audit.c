@@ -1,0 +1,634 @@
+/* Audit (D-BUS-40): what is asked and when, what is done about a difference. Hand-written frames; the logs
+ * audit_*.log in tests/vectors show whole conversations. */
+#include <string.h>
+
+#include "exchange.h"
+#include "unity.h"
+
+static exchange_t x;
+
+/* Device 0002:0002:0004 id 11h, output 1 with id FEh; device 0002:0002:0006 id 12h, input 1. */
+void setUp(void)
+{
+    exchange_start(&x, 0xFFFFFF00u);
+    exchange_add_output(&x, "FE");
+    exchange_add_input(&x);
+    exchange_clear(&x);
+}
+
+void tearDown(void) {}
+
+static uint8_t output(void)
+{
+    return pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+}
+
+static uint8_t input(void)
+{
+    return pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+}
+
+static const pdcp_channel_t *the_input(void)
+{
+    return &x.arb->bus.nodes.channels[input()];
+}
+
+static void make_link(void)
+{
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    exchange_run(&x, exchange_making);
+    exchange_clear(&x);
+}
+
+static void begin(bool planned)
+{
+    make_link();
+    if (planned) {
+        pdcp_arb_plan_links(x.arb, false);
+    }
+    pdcp_arb_audit(x.arb, x.now_ms);
+}
+
+/* The next question, 60 ms after the one before. */
+static void ask(const char *question, const char *answer)
+{
+    exchange_pass(&x, 59);
+    exchange_silence(&x);
+    exchange_pass(&x, 1);
+    exchange_tx(&x, question);
+    exchange_rx(&x, answer);
+}
+
+static const exchange_pair_t writing[] = {
+    {"312#04 05 01 0200 0200", "212#84 01 05 01"}, {"312#04 06 01 0400 01", "212#84 01 06 01"},
+    {"312#04 08 01 0050 2021", "212#84 01 08 01"}, {"312#04 07 01 11 FE", "212#84 01 07 01"},
+    {"312#04 04 01 01", "212#84 01 04 01"},        {"311#04 05 01 FE", "211#84 01 05 01"},
+    {"311#04 04 01 01", "211#84 01 04 01"},        {NULL, NULL},
+};
+
+/* The answer to this question differed: counted, told, repaired. */
+static void expect_repair(uint8_t channel, uint8_t param)
+{
+    exchange_run(&x, writing);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_AUDIT));
+    TEST_ASSERT_EQUAL(channel, exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
+    TEST_ASSERT_EQUAL(param, exchange_last(&x, PDCP_EVENT_AUDIT)->param);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK)); /* it was active, and still is */
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    exchange_clear(&x);
+}
+
+/* With the profile layer, an arbitrator that comes later reads back what inputs name as their source. */
+static void test_a_turn_with_the_profile_layer(void)
+{
+    begin(true);
+    for (int turn = 0; turn < 3; turn++) {
+        ask("311#03 04 01", "211#83 01 04 01 01");
+        ask("312#03 04 01", "212#83 01 04 01 01");
+        ask("311#03 05 01", "211#83 01 05 01 FE");
+        ask("312#03 05 01", "212#83 01 05 01 0200 0200");
+        ask("312#03 06 01", "212#83 01 06 01 0400 01");
+        ask("312#03 07 01", "212#83 01 07 01 11 FE");
+    }
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
+    TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+}
+
+/* Each parameter may be what differs. A value may be longer than its field. */
+static void test_each_parameter_is_compared(void)
+{
+    begin(true);
+    ask("311#03 04 01", "211#83 01 04 01 00");
+    expect_repair(output(), 4);
+    ask("312#03 04 01", "212#83 01 04 01 00");
+    expect_repair(input(), 4);
+    ask("311#03 05 01", "211#83 01 05 01 FD");
+    expect_repair(output(), 5);
+    setUp();
+    begin(true);
+    ask("311#03 04 01", "211#83 01 04 01 01 00");
+    ask("312#03 04 01", "212#83 01 04 01 FF");
+    ask("311#03 05 01", "211#83 01 05 01 FE 00");
+    ask("312#03 05 01", "212#83 01 05 01 0200 0300");
+    expect_repair(input(), 5);
+    ask("312#03 06 01", "212#83 01 06 01 0400 02");
+    expect_repair(input(), 6);
+    ask("312#03 07 01", "212#83 01 07 01 11 FD");
+    expect_repair(input(), 7);
+    TEST_ASSERT_EQUAL(3, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+}
+
+/* An input without a link names none. */
+static void test_an_input_without_a_link(void)
+{
+    static const exchange_pair_t unnaming[] = {
+        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"},
+        {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
+        {"312#04 08 01 0000 0000", "212#84 01 08 01"},
+        {NULL, NULL},
+    };
+    pdcp_arb_plan_links(x.arb, false);
+    pdcp_arb_audit(x.arb, x.now_ms);
+    ask("312#03 06 01", "212#83 01 06 01 FFFF FF");
+    ask("312#03 06 01", "212#83 01 06 01 0400 00"); /* channel index 0 names none */
+    ask("312#03 06 01", "212#83 01 06 01 0400 01");
+    exchange_run(&x, unnaming);
+    TEST_ASSERT_EQUAL(6, exchange_last(&x, PDCP_EVENT_AUDIT)->param);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+}
+
+/* One that named a source when it was set up is left to the profile layer until that has decided. */
+static void test_an_input_whose_source_is_not_decided(void)
+{
+    x.arb->bus.nodes.channels[input()].source_index = 1;
+    pdcp_arb_plan_links(x.arb, false);
+    pdcp_arb_audit(x.arb, x.now_ms);
+    exchange_pass(&x, 239);
+    exchange_silence(&x);
+    exchange_pass(&x, 1);
+    exchange_tx(&x, "311#03 04 01"); /* the fourth question, for a channel without a link */
+}
+
+/* D-BUS-38: what an input names is repaired three times within a minute, then it is told once more, and
+ * nothing of it is done until the minute is over. */
+static void test_a_source_that_is_not_kept(void)
+{
+    begin(true);
+    for (int turn = 0; turn < 6; turn++) {
+        ask("311#03 04 01", "211#83 01 04 01 01");
+        ask("312#03 04 01", "212#83 01 04 01 01");
+        ask("311#03 05 01", "211#83 01 05 01 FE");
+        ask("312#03 05 01", "212#83 01 05 01 0900 0900");
+        if (turn < 3) {
+            expect_repair(input(), 5);
+        } else {
+            TEST_ASSERT_EQUAL(turn == 3 ? 1 : 0, exchange_count(&x, PDCP_EVENT_AUDIT));
+            exchange_clear(&x);
+        }
+        exchange_silence(&x);
+        ask("312#03 06 01", "212#83 01 06 01 0400 01");
+        ask("312#03 07 01", "212#83 01 07 01 11 FE");
+    }
+    TEST_ASSERT_EQUAL(6, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link); /* data flows all the same */
+    for (int i = 0; i < 600; i++) {                         /* the minute passes, without answers */
+        exchange_pass(&x, 100);
+        exchange_beacons(&x);
+        (void)exchange_drain(&x);
+    }
+    exchange_clear(&x);
+    while (exchange_count(&x, PDCP_EVENT_AUDIT) == 0) {
+        exchange_pass(&x, 10);
+        exchange_beacons(&x);
+        (void)exchange_drain(&x);
+        exchange_rx(&x, "212#83 01 05 01 0900 0900");
+    }
+    exchange_tx(&x, "312#04 05 01 0200 0200");
+}
+
+/* The minute begins with the first difference: the fourth one, 60 s later, is the first of another minute. */
+static void test_three_repairs_in_more_than_a_minute(void)
+{
+    begin(false);
+    for (int i = 0; i < 4; i++) {
+        while (exchange_count(&x, PDCP_EVENT_AUDIT) == 0) {
+            exchange_pass(&x, 10);
+            exchange_rx(&x, "012#0A");
+            exchange_rx(&x, "011#0A");
+            (void)exchange_drain(&x);
+            exchange_rx(&x, "212#83 01 04 01 00");
+        }
+        expect_repair(input(), 4);
+        for (int wait = 0; wait < 198; wait++) { /* 19.8 s */
+            exchange_pass(&x, 100);
+            exchange_beacons(&x);
+            (void)exchange_drain(&x);
+        }
+        exchange_clear(&x);
+    }
+    TEST_ASSERT_EQUAL(4, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+}
+
+/* Device 0003:0003:0009 as id 13h: one input, index 1, linked to the same output. */
+static void link_second_input(void)
+{
+    static const exchange_pair_t binding[] = {
+        {"313#81 13 0300 0300 0900", NULL},
+        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
+        {"313#03 02 00", "213#83 01 02 00 0900"},
+        {"313#03 06 00", "213#83 00 06 00"},
+        {"313#03 0B 00", "213#83 00 0B 00"},
+        {"313#03 0A 00", "213#83 00 0A 00"},
+        {"313#03 09 00", "213#83 01 09 00 01"},
+        {"313#04 04 01 00", "213#84 01 04 01 00"},
+        {"313#03 03 01", "213#83 01 03 01 01"},
+        {"313#03 01 01", "213#83 01 01 01 0053 1011"},
+        {"313#03 05 01", "213#83 00 05 01"},
+        {"313#03 06 01", "213#83 00 06 01"},
+        {"313#03 08 01", "213#83 00 08 01"},
+        {"313#03 09 01", "213#83 00 09 01"},
+        {"313#03 0A 01", "213#83 00 0A 01"},
+        {"313#03 0B 01", "213#83 00 0B 01"},
+        {NULL, NULL},
+    };
+    static const exchange_pair_t linking[] = {
+        {"313#04 05 01 0200 0200", "213#84 01 05 01"}, {"313#04 06 01 0400 01", "213#84 01 06 01"},
+        {"313#04 08 01 0050 2021", "213#84 01 08 01"}, {"313#04 07 01 11 FE", "213#84 01 07 01"},
+        {"313#04 04 01 01", "213#84 01 04 01"},        {NULL, NULL},
+    };
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_run(&x, binding);
+    exchange_rx(&x, "013#0A");
+    TEST_ASSERT_EQUAL(PDCP_OK,
+                      pdcp_arb_connect(x.arb, output(), pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)));
+    exchange_run(&x, linking);
+    exchange_clear(&x);
+}
+
+/* An output that cannot be kept takes all its links with it. */
+static void test_an_output_that_is_not_kept(void)
+{
+    static const exchange_pair_t silencing[] = {
+        {"311#04 04 01 00", "211#84 01 04 01"},   {"312#04 04 01 00", "212#84 01 04 01"},
+        {"312#04 07 01 0000", "212#84 01 07 01"}, {"313#04 04 01 00", "213#84 01 04 01"},
+        {"313#04 07 01 0000", "213#84 01 07 01"}, {NULL, NULL},
+    };
+    make_link();
+    link_second_input();
+    pdcp_arb_audit(x.arb, x.now_ms);
+    for (int turn = 0; turn < 4; turn++) {
+        ask("311#03 04 01", "211#83 01 04 01 00");
+        if (turn < 3) {
+            exchange_run(&x, writing);
+            ask("312#03 04 01", "212#83 01 04 01 01");
+            ask("313#03 04 01", "213#83 01 04 01 01");
+            ask("311#03 05 01", "211#83 01 05 01 FE");
+            ask("312#03 07 01", "212#83 01 07 01 11 FE");
+            ask("313#03 07 01", "213#83 01 07 01 11 FE");
+        }
+    }
+    TEST_ASSERT_EQUAL(4, exchange_count(&x, PDCP_EVENT_AUDIT));
+    TEST_ASSERT_EQUAL(2, exchange_count(&x, PDCP_EVENT_LINK));
+    TEST_ASSERT_EQUAL(PDCP_ERR_DIFFERS, exchange_last(&x, PDCP_EVENT_LINK)->status);
+    exchange_run(&x, silencing);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE,
+                      x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)].link);
+}
+
+/* An answer is compared only if neither the entry nor a job has changed since the question. */
+static void test_an_answer_that_was_overtaken(void)
+{
+    begin(false);
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "311#03 04 01");
+    exchange_rx(&x, "212#0F 01"); /* Update Data Channel: a job */
+    exchange_tx(&x, "312#03 05 01");
+    exchange_rx(&x, "212#83 01 05 01 0200 0200");
+    exchange_tx(&x, "312#03 06 01");
+    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_tx(&x, "312#8F 01 01");
+    exchange_rx(&x, "211#83 01 04 01 00"); /* asked before it */
+    exchange_silence(&x);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
+    ask("312#03 04 01", "212#83 01 04 01 01");
+}
+
+/* The link is taken away after the question. */
+static void test_an_answer_about_a_link_that_is_gone(void)
+{
+    static const exchange_pair_t removing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01"},
+        {"312#04 07 01 0000", "212#84 01 07 01"},
+        {"312#04 08 01 0000 0000", "212#84 01 08 01"},
+        {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
+        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"},
+        {"311#04 04 01 00", "211#84 01 04 01"},
+        {NULL, NULL},
+    };
+    begin(false);
+    ask("311#03 04 01", "211#83 01 04 01 01");
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "312#03 04 01");
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    exchange_silence(&x);
+    exchange_rx(&x, "212#83 01 04 01 00");
+    exchange_run(&x, removing);
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
+}
+
+/* While a device is set up, a link is made or a wish waits, nothing is asked. */
+static void test_everything_else_comes_first(void)
+{
+    begin(false);
+    exchange_rx(&x, "613#01 0300 0300 0900");
+    exchange_tx(&x, "313#81 13 0300 0300 0900");
+    exchange_tx(&x, "313#03 01 00");
+    exchange_pass(&x, 90);
+    exchange_silence(&x);
+    exchange_rx(&x, "213#83 01 01 00 0300 0300");
+    exchange_tx(&x, "313#03 02 00");
+    exchange_rx(&x, "213#83 01 02 00 0900");
+    exchange_tx(&x, "313#03 06 00");
+    exchange_rx(&x, "213#83 00 06 00");
+    exchange_tx(&x, "313#03 0B 00");
+    exchange_rx(&x, "213#83 00 0B 00");
+    exchange_tx(&x, "313#03 0A 00");
+    exchange_rx(&x, "213#83 00 0A 00");
+    exchange_tx(&x, "313#03 09 00");
+    exchange_rx(&x, "213#83 01 09 00 00"); /* no channels: it is set up */
+    exchange_pass(&x, 30);
+    exchange_tx(&x, "311#03 04 01");
+    exchange_rx(&x, "211#83 01 04 01 01");
+    exchange_rx(&x, "212#0F 01");
+    exchange_tx(&x, "312#03 05 01");
+    exchange_pass(&x, 90); /* a job waits for its device */
+    exchange_silence(&x);
+}
+
+/* A device whose place is taken is passed over, and so is one that is not set up. */
+static void test_a_busy_device_holds_up_nobody(void)
+{
+    uint8_t bytes[8];
+    begin(false);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_get(x.arb, 0, 0, 7, bytes, sizeof bytes));
+    exchange_tx(&x, "311#03 07 00");
+    ask("312#03 04 01", "212#83 01 04 01 01");
+    exchange_rx(&x, "211#83 01 07 00 41");
+    ask("311#03 05 01", "211#83 01 05 01 FE");
+    ask("312#03 07 01", "212#83 01 07 01 11 FE");
+    ask("311#03 04 01", "211#83 01 04 01 01");
+}
+
+/* What was refused is asked again when the device was set up again. */
+static void test_a_refusal_ends_with_the_next_setup(void)
+{
+    begin(true);
+    ask("311#03 04 01", "211#83 00 04 01");
+    ask("312#03 04 01", "212#83 00 04 01");
+    ask("311#03 05 01", "211#83 00 05 01");
+    ask("312#03 05 01", "212#83 00 05 01");
+    ask("312#03 06 01", "212#83 00 06 01");
+    ask("312#03 07 01", "212#83 00 07 01");
+    for (int i = 0; i < 5; i++) {
+        exchange_pass(&x, 200);
+        exchange_silence(&x);
+        exchange_beacons(&x);
+    }
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
+    pdcp_audit_on_ready(&x.arb->bus, 0);
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "311#03 04 01");
+}
+
+/* D-BUS-41: an unanswered question of the audit, of one try, is no sign that a device was reset. */
+static void test_a_lost_answer_does_not_bind_another_device(void)
+{
+    begin(false);
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "311#03 04 01");
+    exchange_rx(&x, "611#01 0200 0200 0400"); /* its identity asks again */
+    exchange_silence(&x);
+    exchange_pass(&x, 100); /* the answer is lost */
+    exchange_tx(&x, "311#03 01 00");
+    exchange_rx(&x, "211#83 01 01 00 0200 0200");
+    exchange_tx(&x, "311#81 00 0200 0200 0400"); /* refused: it is another one */
+}
+
+/* Somebody else's frames put a device first, but never keep the others from their turn. */
+static void test_a_flood_of_foreign_frames(void)
+{
+    unsigned first = 0;
+    unsigned others = 0;
+    begin(false);
+    for (int ms = 1; ms <= 60 * 40; ms++) {
+        exchange_rx(&x, "312#03 01 00");
+        exchange_wait(&x, 1);
+        if (ms % 500 == 0) {
+            exchange_beacons(&x);
+        }
+        const can_frame_t *sent = pdcp_arb_tx_peek(x.arb);
+        if (sent == NULL) {
+            continue;
+        }
+        first += sent->id == 0x312 ? 1 : 0;
+        others += sent->id == 0x311 ? 1 : 0;
+        const bool is_enabled = sent->data[1] == 4;
+        const bool is_first = sent->id == 0x312;
+        pdcp_arb_tx_pop(x.arb);
+        if (is_first) {
+            exchange_rx(&x, is_enabled ? "212#83 01 04 01 01" : "212#83 01 07 01 11 FE");
+        } else {
+            exchange_rx(&x, is_enabled ? "211#83 01 04 01 01" : "211#83 01 05 01 FE");
+        }
+    }
+    TEST_ASSERT_EQUAL(40, first + others);
+    TEST_ASSERT_GREATER_OR_EQUAL(20, first);
+    TEST_ASSERT_GREATER_OR_EQUAL(8, others);
+}
+
+/* A device goes first as a whole, its channels without a link too. */
+static void test_a_channel_without_a_link_goes_first_too(void)
+{
+    pdcp_arb_audit(x.arb, x.now_ms);
+    exchange_rx(&x, "312#04 04 01 01");
+    exchange_pass(&x, 60);
+    exchange_tx(&x, "312#03 04 01");
+    exchange_rx(&x, "212#83 01 04 01 01");
+    exchange_tx(&x, "312#04 04 01 00");
+    exchange_rx(&x, "212#84 01 04 01");
+    exchange_tx(&x, "312#04 07 01 0000");
+    exchange_rx(&x, "212#84 01 07 01");
+    TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
+    TEST_ASSERT_EQUAL(4, exchange_last(&x, PDCP_EVENT_AUDIT)->param);
+}
+
+/* --- A large limb: 32 devices with two outputs and two inputs each, 64 links --- */
+
+enum { DEVICES = PDCP_DEVICES_MAX, CHANNELS = PDCP_CHANNELS_MAX, PARAMS = 4 };
+
+#define LIMIT_MS 40000uL
+#define BITS_A_MS 1000uL
+
+static uint32_t last_ms[CHANNELS][PARAMS]; /* when it was asked, 0: never */
+static uint32_t bus_bits;
+static unsigned asked; /* questions, */
+static unsigned spare; /* and those for channels without a link */
+
+static void build_limb(void)
+{
+    pdcp_nodes_t *nodes = &x.arb->bus.nodes;
+    pdcp_nodes_init(nodes);
+    for (uint8_t place = 0; place < DEVICES; place++) {
+        const pdcp_identity_t identity = {2, 2, (uint16_t)(place + 1)};
+        pdcp_nodes_add(nodes, place, &identity, (uint8_t)(place + 1));
+        nodes->nodes[place].state = PDCP_NODE_READY;
+        nodes->nodes[place].ack_ms = 100;
+        TEST_ASSERT_TRUE(pdcp_nodes_set_channels(nodes, place, CHANNELS / DEVICES));
+    }
+    for (uint8_t i = 0; i < CHANNELS; i++) {
+        pdcp_channel_t *channel = &nodes->channels[i];
+        channel->transfer = i % 4 < 2 ? PDCP_OUTPUT : PDCP_INPUT;
+        channel->enabled = true;
+        if (channel->transfer == PDCP_OUTPUT) {
+            pdcp_nodes_set_output_id(nodes, channel, (uint8_t)(254 - i));
+        }
+    }
+    for (uint8_t i = 2; i < CHANNELS; i = (uint8_t)(i % 4 == 2 ? i + 1 : i + 3)) {
+        pdcp_channel_t *channel = &nodes->channels[i];
+        channel->feed = (uint8_t)((i + 2) % CHANNELS); /* an output of the next device */
+        channel->source = nodes->nodes[nodes->channels[channel->feed].node].identity;
+        channel->source_index = nodes->channels[channel->feed].index;
+        channel->link = PDCP_LINK_ACTIVE;
+    }
+}
+
+/* Bits of a frame with as many stuff bits as can be, and the interframe space. */
+static uint32_t bits_of(uint8_t dlc)
+{
+    return 44u + 8u * dlc + (34u + 8u * dlc - 1u) / 4u + 3u;
+}
+
+/* What the device answers when all is as it should be. */
+static void answer(uint8_t number, uint8_t param)
+{
+    const pdcp_nodes_t *nodes = &x.arb->bus.nodes;
+    const pdcp_channel_t *channel = &nodes->channels[number];
+    can_frame_t frame = {.id = (uint16_t)(0x200u | nodes->nodes[channel->node].node_id),
+                         .dlc = 5,
+                         .data = {0x83, 1, param, channel->index, channel->enabled ? 1 : 0}};
+    if (param == 5 && channel->transfer == PDCP_OUTPUT) {
+        frame.data[4] = channel->node_id;
+    } else if (param == 5) {
+        frame.dlc = 8;
+        pdcp_put_u16(&frame.data[4], channel->source.vid);
+        pdcp_put_u16(&frame.data[6], channel->source.pid);
+    } else if (param == 6) {
+        frame.dlc = 7;
+        pdcp_put_u16(&frame.data[4], channel->source.sn);
+        frame.data[6] = channel->source_index;
+    } else if (param == 7) {
+        frame.dlc = 6;
+        frame.data[4] = nodes->nodes[nodes->channels[channel->feed].node].node_id;
+        frame.data[5] = nodes->channels[channel->feed].node_id;
+    }
+    bus_bits += bits_of(frame.dlc);
+    (void)pdcp_arb_on_frame(x.arb, x.now_ms, &frame);
+}
+
+static void on_question(const can_frame_t *frame, uint32_t ms)
+{
+    uint8_t place;
+    TEST_ASSERT_EQUAL_HEX16(0x300, frame->id & 0x700u);
+    TEST_ASSERT_EQUAL(3, frame->dlc);
+    TEST_ASSERT_EQUAL_HEX8(0x03, frame->data[0]);
+    TEST_ASSERT_TRUE(pdcp_nodes_owner(&x.arb->bus.nodes, (uint8_t)(frame->id & 0xFFu), &place));
+    const uint8_t number = pdcp_nodes_channel(&x.arb->bus.nodes, place, frame->data[2]);
+    const uint8_t param = frame->data[1];
+    uint32_t *last = &last_ms[number][param - 4];
+    TEST_ASSERT_LESS_THAN_UINT32(LIMIT_MS, ms - *last);
+    *last = ms;
+    bus_bits += bits_of(frame->dlc);
+    asked++;
+    if (!x.arb->bus.nodes.channels[number].enabled) {
+        TEST_ASSERT_EQUAL(4, param);
+        spare++;
+    }
+    answer(number, param);
+}
+
+/* Audits for two minutes. Everything that is to be asked is, no longer than LIMIT_MS after the last time. */
+static void audit_limb(void)
+{
+    memset(last_ms, 0, sizeof last_ms);
+    bus_bits = 0;
+    asked = 0;
+    spare = 0;
+    pdcp_arb_plan_links(x.arb, false);
+    pdcp_arb_audit(x.arb, x.now_ms);
+    const uint32_t start_ms = x.now_ms;
+    while (x.now_ms - start_ms < 3 * LIMIT_MS) {
+        x.now_ms = pdcp_arb_step(x.arb, x.now_ms);
+        (void)pdcp_arb_step(x.arb, x.now_ms);
+        const can_frame_t *sent = pdcp_arb_tx_peek(x.arb);
+        while (sent != NULL) {
+            const can_frame_t frame = *sent;
+            pdcp_arb_tx_pop(x.arb);
+            if (frame.id != 0x100) {
+                on_question(&frame, x.now_ms - start_ms);
+            }
+            sent = pdcp_arb_tx_peek(x.arb);
+        }
+    }
+    TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+    TEST_ASSERT_LESS_THAN_UINT32(3 * LIMIT_MS * BITS_A_MS / 100, bus_bits); /* 1 % */
+}
+
+static void expect_asked(uint8_t number, uint8_t param)
+{
+    TEST_ASSERT_GREATER_THAN_UINT32(2 * LIMIT_MS, last_ms[number][param - 4]);
+}
+
+/* D-BUS-40: a turn of 64 links takes less than 40 s, and less than 1 % of the bus. */
+static void test_a_turn_of_64_links(void)
+{
+    exchange_start(&x, 0xFFFFFF00u);
+    build_limb();
+    audit_limb();
+    for (uint8_t i = 0; i < CHANNELS; i++) {
+        expect_asked(i, 4);
+        expect_asked(i, 5);
+        if (i % 4 >= 2) {
+            expect_asked(i, 6);
+            expect_asked(i, 7);
+        } else {
+            TEST_ASSERT_EQUAL(0, last_ms[i][6 - 4]);
+        }
+    }
+}
+
+/* 64 inputs that hear one output, and 63 outputs that nobody hears: each fourth question is for one of these,
+ * whether it is enabled (4), and nothing else. */
+static void test_a_turn_with_channels_that_have_no_link(void)
+{
+    exchange_start(&x, 0xFFFFFF00u);
+    build_limb();
+    for (uint8_t i = 0; i < CHANNELS; i++) {
+        pdcp_channel_t *channel = &x.arb->bus.nodes.channels[i];
+        if (i % 4 < 2) {
+            channel->enabled = i == 0;
+        } else {
+            channel->feed = 0;
+            channel->source = x.arb->bus.nodes.nodes[0].identity;
+            channel->source_index = 1;
+        }
+    }
+    audit_limb();
+    TEST_ASSERT_EQUAL(asked / 4, spare);
+    for (uint8_t i = 0; i < CHANNELS; i++) {
+        expect_asked(i, 4);
+    }
+}
+
+int main(void)
+{
+    UNITY_BEGIN();
+    RUN_TEST(test_a_turn_with_the_profile_layer);
+    RUN_TEST(test_each_parameter_is_compared);
+    RUN_TEST(test_an_input_without_a_link);
+    RUN_TEST(test_an_input_whose_source_is_not_decided);
+    RUN_TEST(test_a_source_that_is_not_kept);
+    RUN_TEST(test_three_repairs_in_more_than_a_minute);
+    RUN_TEST(test_an_output_that_is_not_kept);
+    RUN_TEST(test_an_answer_that_was_overtaken);
+    RUN_TEST(test_an_answer_about_a_link_that_is_gone);
+    RUN_TEST(test_everything_else_comes_first);
+    RUN_TEST(test_a_busy_device_holds_up_nobody);
+    RUN_TEST(test_a_refusal_ends_with_the_next_setup);
+    RUN_TEST(test_a_lost_answer_does_not_bind_another_device);
+    RUN_TEST(test_a_flood_of_foreign_frames);
+    RUN_TEST(test_a_channel_without_a_link_goes_first_too);
+    RUN_TEST(test_a_turn_of_64_links);
+    RUN_TEST(test_a_turn_with_channels_that_have_no_link);
+    return UNITY_END();
+}

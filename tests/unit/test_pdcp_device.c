@@ -1138,10 +1138,9 @@ static void test_silence_stops_streaming_and_makes_inputs_safe(void)
     TEST_ASSERT_EQUAL_UINT(1, seen.safes);
     rx(0x355, "03 01 00"); /* a request to another device is a sign of life, too */
     TEST_ASSERT_EQUAL_INT(PDCP_DEVICE_BOUND, pdcp_device_state(&dev));
-    TEST_ASSERT_TRUE(pdcp_device_send(&dev, now, 3, data, 1));
-    TX(0x023, "09");
+    TEST_ASSERT_FALSE(pdcp_device_send(&dev, now, 3, data, 1)); /* its ids may be others' by now (D-BUS-35) */
     rx(0x022, "05");
-    TEST_ASSERT_EQUAL_UINT(1, seen.inputs);
+    TEST_ASSERT_EQUAL_UINT(0, seen.inputs);
 }
 
 static void test_devices_are_no_sign_of_an_arbitrator(void)

@@ -95,7 +95,7 @@ static void put_audit(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t 
     uint8_t *data = put(events, now_ms, ARB_EVENT_AUDIT, 8);
     if (data != NULL) {
         arb_host_put_channel(data, &nodes->nodes[channel->node].identity, channel->index);
-        data[7] = event->param;
+        data[7] = (uint8_t)event->status;
     }
 }
 

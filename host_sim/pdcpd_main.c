@@ -88,7 +88,7 @@ static void say_audit(const daemon_t *daemon, const pdcp_event_t *event)
     const pdcp_channel_t *channel = &nodes->channels[event->channel];
     const pdcp_identity_t *owner = &nodes->nodes[channel->node].identity;
     say(daemon, PDCPD_LOG_WARNING, "%u:%u:%u.%u had a wrong parameter %u", owner->vid, owner->pid, owner->sn,
-        channel->index, event->param);
+        channel->index, (unsigned)event->status);
 }
 
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)

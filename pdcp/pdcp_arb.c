@@ -1143,17 +1143,13 @@ void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pd
                        uint8_t index, uint16_t type, uint16_t profile)
 {
     pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
-    const bool named = pdcp_identity_equal(&channel->source, owner) && channel->source_index == index &&
-                       channel->source_type == type && channel->source_profile == profile;
     arb->bus.now_ms = now_ms;
     channel->source = *owner;
     channel->source_index = index;
     channel->source_type = type;
     channel->source_profile = profile;
     channel->link = PDCP_LINK_INACTIVE;
-    if (!named) {
-        pdcp_link_write(&arb->bus, input);
-    }
+    pdcp_link_write(&arb->bus, input);
     pdcp_bus_tell_link(&arb->bus, PDCP_EVENT_LINK, input, PDCP_OK);
 }
 

@@ -137,8 +137,7 @@ void pdcp_arb_audit(pdcp_arb_t *arb, uint32_t now_ms);
 void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input);
 
 /* Lists a link of an input that has none as inactive, with a source that need not be there: the output with
- * this channel index, type and profile, of the device owner. An input that named another source is told
- * (D-BUS-38). */
+ * this channel index, type and profile, of the device owner. The input is told (D-BUS-38). */
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
                        uint8_t index, uint16_t type, uint16_t profile);
 

@@ -244,7 +244,7 @@ static void on_difference(pdcp_bus_t *bus, uint8_t number, uint8_t param)
     const uint8_t times = count_difference(&bus->audit, input, source);
     pdcp_bus_count(bus, PDCP_STAT_AUDIT);
     if (times < TOO_MANY) {
-        pdcp_bus_tell_audit(bus, number, param);
+        pdcp_bus_tell_link(bus, PDCP_EVENT_AUDIT, number, (pdcp_status_t)param);
     }
     if (!linked && !source) {
         pdcp_link_silence(bus, number);

@@ -49,13 +49,6 @@ void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t i
     tell(bus, kind, PDCP_NONE, input, status);
 }
 
-void pdcp_bus_tell_audit(const pdcp_bus_t *bus, uint8_t channel, uint8_t param)
-{
-    const pdcp_event_t event = {
-        .kind = PDCP_EVENT_AUDIT, .node = PDCP_NONE, .channel = channel, .param = param};
-    bus->on_event(bus->event_ctx, bus->now_ms, &event);
-}
-
 void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
 {
     bus->stats[stat]++;

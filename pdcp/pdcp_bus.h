@@ -30,15 +30,15 @@ typedef enum {
     PDCP_EVENT_SILENT,  /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
     PDCP_EVENT_STARTED, /* and has started afresh */
     PDCP_EVENT_STATE,   /* the bus has another state; status holds it (pdcp_bus_state_t) */
-    PDCP_EVENT_AUDIT,   /* channel: its device does not have what the tables say in param (D-BUS-40) */
-    PDCP_EVENT_REQUEST  /* node: the host's request has ended with status; len bytes of value */
+    PDCP_EVENT_AUDIT,  /* channel: a parameter of it was not as the tables say; status holds its id (D-BUS-40)
+                        */
+    PDCP_EVENT_REQUEST /* node: the host's request has ended with status; len bytes of value */
 } pdcp_event_kind_t;
 
 typedef struct {
     pdcp_event_kind_t kind;
     uint8_t node;
     uint8_t channel;
-    uint8_t param; /* PDCP_EVENT_AUDIT: parameter id */
     int8_t status; /* pdcp_status_t */
     uint16_t len;
 } pdcp_event_t;
@@ -86,12 +86,9 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
 
-/* Tells of a device (PDCP_NONE: of none), or of an input and its link. */
+/* Tells of a device (PDCP_NONE: of none), or of a channel: an input and its link. */
 void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status);
 void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status);
-
-/* Tells of a channel whose device does not have what the tables say in this parameter. */
-void pdcp_bus_tell_audit(const pdcp_bus_t *bus, uint8_t channel, uint8_t param);
 
 /* The same of a device, when there is no more to say. */
 void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node);

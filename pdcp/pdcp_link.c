@@ -312,17 +312,16 @@ static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t outp
     if (channel != NULL) {
         take_old(bus, channel);
     }
-    if (kind == PDCP_TODO_CONNECT || kind == PDCP_TODO_UPDATE) {
-        bus->link.step = STEP_READ_VID_PID;
-        bus->link.undoing = false;
-    }
-    if (kind == PDCP_TODO_CONNECT) {
-        bus->link.step = STEP_OUTPUT_ID;
-        name_source(bus, channel);
-    }
     if (kind == PDCP_TODO_WRITE) {
         bus->link.step = STEP_VID_PID;
         bus->link.undoing = false;
+    } else if (kind == PDCP_TODO_UPDATE) {
+        bus->link.step = STEP_READ_VID_PID;
+        bus->link.undoing = false;
+    } else if (kind == PDCP_TODO_CONNECT) {
+        bus->link.step = STEP_OUTPUT_ID;
+        bus->link.undoing = false;
+        name_source(bus, channel);
     }
 }
 
@@ -421,12 +420,11 @@ static void end(pdcp_bus_t *bus)
 static void give_up(pdcp_bus_t *bus, pdcp_status_t status)
 {
     pdcp_channel_t *input = channel_of(bus, bus->link.input);
-    const bool writes = bus->link.kind == PDCP_TODO_WRITE;
     bus->link.status = (int8_t)status;
-    if (input != NULL && !writes) {
+    if (input != NULL) {
         give_back_old(bus, input);
     }
-    if (bus->link.step < STEP_VID_PID || writes) {
+    if (bus->link.step < STEP_VID_PID) {
         end(bus);
         return;
     }
@@ -609,7 +607,7 @@ static void run(pdcp_bus_t *bus)
         pdcp_channel_t *channel = channel_of(bus, target_of(bus));
         const bool is_idle = bus->link.step == STEP_OUTPUT_ID && has_id(bus, bus->link.output);
         if (!step_possible(bus)) {
-            if (bus->link.undoing) {
+            if (bus->link.undoing || bus->link.kind == PDCP_TODO_WRITE) {
                 advance(bus);
             } else {
                 give_up(bus, PDCP_ERR_NO_ANSWER);
@@ -675,7 +673,8 @@ static void leave_out(pdcp_bus_t *bus, pdcp_status_t status)
     const bool silent = status == PDCP_ERR_NO_ANSWER;
     if (bus->link.step <= STEP_READ_SERIAL) {
         if (silent) {
-            give_up(bus, status);
+            bus->link.status = (int8_t)status;
+            end(bus);
         } else {
             look_at_source(bus);
         }

@@ -72,7 +72,7 @@ static void expect_repair(uint8_t channel, uint8_t param)
     exchange_run(&x, writing);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_AUDIT));
     TEST_ASSERT_EQUAL(channel, exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
-    TEST_ASSERT_EQUAL(param, exchange_last(&x, PDCP_EVENT_AUDIT)->param);
+    TEST_ASSERT_EQUAL(param, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK)); /* it was active, and still is */
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
     exchange_clear(&x);
@@ -133,7 +133,7 @@ static void test_an_input_without_a_link(void)
     ask("312#03 06 01", "212#83 01 06 01 0400 00"); /* channel index 0 names none */
     ask("312#03 06 01", "212#83 01 06 01 0400 01");
     exchange_run(&x, unnaming);
-    TEST_ASSERT_EQUAL(6, exchange_last(&x, PDCP_EVENT_AUDIT)->param);
+    TEST_ASSERT_EQUAL(6, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
 }
 
@@ -440,7 +440,7 @@ static void test_a_channel_without_a_link_goes_first_too(void)
     exchange_tx(&x, "312#04 07 01 0000");
     exchange_rx(&x, "212#84 01 07 01");
     TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
-    TEST_ASSERT_EQUAL(4, exchange_last(&x, PDCP_EVENT_AUDIT)->param);
+    TEST_ASSERT_EQUAL(4, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
 }
 
 /* --- A large limb: 32 devices with two outputs and two inputs each, 64 links --- */

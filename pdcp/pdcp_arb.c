@@ -626,7 +626,8 @@ static bool conclude_check(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status)
 static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
     const pdcp_node_t *device = node_of(arb, node);
-    if (pdcp_setup_on_reply(&arb->bus, node, reply) == PDCP_ERR_UNKNOWN && device->taken_back) {
+    if (pdcp_setup_on_reply(&arb->bus, node, reply) ==
+        PDCP_ERR_UNKNOWN) { /* another device has this id, too */
         reset_stranger(arb, device->node_id);
         lose(arb, node);
         return;
@@ -646,8 +647,11 @@ static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
 static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
     const pdcp_status_t status = (pdcp_status_t)reply->status;
-    const bool unheard = reply->client == PDCP_CLIENT_AUDIT && status == PDCP_ERR_NO_ANSWER; /* of one try */
-    if (reply->done && !unheard && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
+    /* Silence shows nothing when a question was asked once, or is one that no device need answer (D-BUS-41).
+     */
+    const bool counts = status != PDCP_ERR_NO_ANSWER ||
+                        (reply->client != PDCP_CLIENT_AUDIT && reply->client != PDCP_CLIENT_RAW);
+    if (reply->done && counts && node_of(arb, node)->asked_again && conclude_check(arb, node, status)) {
         return;
     }
     if (reply->client == PDCP_CLIENT_SETUP) {

@@ -190,8 +190,8 @@ static void enter_bound(pdcp_device_t *dev, uint32_t now_ms)
     }
 }
 
-/* Nobody watches what it sends and hears, and its ids may be given to others meanwhile: it takes no part until an
- * arbitrator enables its channels again (D-BUS-35). */
+/* Nobody watches what it sends and hears, and its ids may be given to others meanwhile: it takes no part
+ * until an arbitrator enables its channels again (D-BUS-35). */
 static void enter_alone(pdcp_device_t *dev)
 {
     dev->bulk.mode = PDCP_DEVICE_BULK_IDLE;
@@ -225,6 +225,7 @@ static void on_bind_answer(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t
     if (msg->node_id == dev->node_id) {
         enter(dev, PDCP_DEVICE_BOUND, now_ms);
     } else if (msg->node_id == PDCP_NODE_REFUSED) {
+        dev->node_id = 0; /* no answer is awaited any more: a grant would be for a twin with this identity */
         dev->stats.bind_refused++;
     } else if (!is_node_id(msg->node_id) || dev->suggestions >= SUGGESTIONS_MAX) {
         dev->stats.drop_bind++;

@@ -345,6 +345,24 @@ static void test_any_frame_from_its_id_answers_for_a_device(void)
     TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
 }
 
+/* D-BUS-41: a host's frame that no device need answer shows nothing; the identity is asked all the same. */
+static void test_silence_to_a_hosts_frame_is_no_check(void)
+{
+    static uint8_t frame[8] = {0x55};
+    exchange_add_output(&x, "FE");
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_passthrough(x.arb, 0, frame, 1));
+    exchange_tx(&x, "311#55");
+    exchange_rx(&x, "620#01 0200 0200 0400");
+    for (int tries = 1; tries < PDCP_TRIES; tries++) {
+        exchange_pass(&x, PDCP_ACK_MS);
+        exchange_tx(&x, "311#55");
+    }
+    exchange_pass(&x, PDCP_ACK_MS);
+    exchange_tx(&x, "311#03 01 00");
+    exchange_rx(&x, "211#83 01 01 00 0200 0200");
+    exchange_tx(&x, "320#81 00 0200 0200 0400");
+}
+
 /* The grant was lost on the way: the device asks again while the arbitrator tries to set it up. */
 static void test_a_lost_grant_is_repeated(void)
 {
@@ -398,6 +416,7 @@ int main(void)
     RUN_TEST(test_a_device_that_was_reset_is_granted_again);
     RUN_TEST(test_a_device_that_was_reset_and_asks_for_another_id_gets_its_own_suggested);
     RUN_TEST(test_any_frame_from_its_id_answers_for_a_device);
+    RUN_TEST(test_silence_to_a_hosts_frame_is_no_check);
     RUN_TEST(test_a_lost_grant_is_repeated);
     RUN_TEST(test_what_is_no_bind_request_is_counted);
     return UNITY_END();

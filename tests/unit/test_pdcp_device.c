@@ -406,6 +406,20 @@ static void test_requests_double_to_eight_seconds_and_spread(void)
     TEST_ASSERT_TRUE(odd > 250); /* of 300: spread at random */
 }
 
+/* D-BUS-56: a grant that comes behind a refusal is for a twin with the same identity, which asked for the
+ * same id. */
+static void test_after_a_refusal_no_grant_is_taken(void)
+{
+    const pdcp_device_record_t record = blank_record(ID);
+    boot(&record);
+    TX(BIND, "01 0200 0300 0400");
+    rx(TO, "81 00 0200 0300 0400");
+    char grant[] = "81 11 0200 0300 0400";
+    (void)snprintf(grant, sizeof grant, "81 %02X 0200 0300 0400", ID);
+    rx(TO, grant);
+    TEST_ASSERT_EQUAL_INT(PDCP_DEVICE_ASKING, pdcp_device_state(&dev));
+}
+
 static void test_refusal_is_no_answer_and_suggestion_starts_the_pauses_afresh(void)
 {
     const pdcp_device_record_t record = blank_record(ID);
@@ -1472,6 +1486,7 @@ int main(void)
     RUN_TEST(test_suggestion_is_asked_for_at_once);
     RUN_TEST(test_endless_suggestions_do_not_fill_the_bus);
     RUN_TEST(test_requests_double_to_eight_seconds_and_spread);
+    RUN_TEST(test_after_a_refusal_no_grant_is_taken);
     RUN_TEST(test_refusal_is_no_answer_and_suggestion_starts_the_pauses_afresh);
     RUN_TEST(test_bind_timeout_comes_from_the_description);
     RUN_TEST(test_unbound_device_answers_nothing);

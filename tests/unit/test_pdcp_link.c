@@ -605,7 +605,7 @@ static void test_a_link_whose_source_has_gone_is_not_made(void)
 }
 
 /* A device was slow: the answer to an earlier write of the parameter, given up meanwhile, comes while another
- * value is being written, which may get lost. It must not be taken for the answer to that. */
+ * value is being written, which may get lost. It must not be taken for the answer to that (D-BUS-55). */
 static void test_an_answer_that_tells_of_another_value_is_late(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));

@@ -74,12 +74,6 @@ static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
     return channel->enabled && pdcp_link_listener(bus, number) != PDCP_NONE;
 }
 
-/* Is the channel of no active link, and silent as far as is known? */
-static bool is_spare(const pdcp_channel_t *channel)
-{
-    return !channel->enabled && channel->link != PDCP_LINK_ACTIVE;
-}
-
 /* Is the input to be asked for this parameter, which names its source? Without a link it must name none,
  * which parameter 6 tells, but not while the tables have one for it: whether it gets that link is still to be
  * decided. */
@@ -93,7 +87,7 @@ static bool is_source_asked(const pdcp_channel_t *input, uint8_t param)
 static bool is_asked(const pdcp_bus_t *bus, uint8_t number, uint8_t param, pdcp_audit_walk_t walk)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (walk != PDCP_AUDIT_TURN && param == PDCP_CH_ENABLED && is_spare(channel)) {
+    if (walk != PDCP_AUDIT_TURN && param == PDCP_CH_ENABLED && !is_linked(bus, number)) {
         return true;
     }
     if (walk == PDCP_AUDIT_SPARE) {
@@ -266,5 +260,7 @@ void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
         pdcp_set_bit(bus->audit.refused[reply->param - PDCP_AUDIT_FIRST], number, true);
     } else if (!agrees(bus, number, reply)) {
         on_difference(bus, number, reply->param);
+    } else if (reply->param == PDCP_CH_ENABLED && !is_linked(bus, number)) {
+        bus->nodes.channels[number].enabled = false; /* it may have refused that before */
     }
 }

@@ -8,7 +8,7 @@ static struct {
     bool on;
 } switches[LIFE_SWITCHES] = {
     [LIFE_VALUES] = {"values", true, false},
-    [LIFE_FLAGS] = {"flags", false, false}, /* D-BUS-40 */
+    [LIFE_FLAGS] = {"flags", true, false},
     [LIFE_TWINS] = {"twins", true, false},
     [LIFE_CLONES_COME] = {"clones", false, false}, /* D-BUS-40: what a twin leaves behind */
     [LIFE_LOOSE_PLUGS] = {"loose", true, false},

@@ -149,6 +149,53 @@ static void test_an_input_whose_source_is_not_decided(void)
     exchange_tx(&x, "311#03 04 01"); /* the fourth question, for a channel without a link */
 }
 
+/* An input that refuses to be disabled without its link is asked later, and told again. */
+static void test_an_input_that_refused_to_be_disabled(void)
+{
+    static const exchange_pair_t refusing[] = {
+        {"312#04 04 01 00", "212#84 00 04 01"},
+        {"312#04 07 01 0000", "212#84 01 07 01"},
+        {"312#04 08 01 0000 0000", "212#84 01 08 01"},
+        {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
+        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"},
+        {"311#04 04 01 00", "211#84 01 04 01"},
+        {NULL, NULL},
+    };
+    static const exchange_pair_t silencing[] = {
+        {"312#04 04 01 00", "212#84 01 04 01"},
+        {"312#04 07 01 0000", "212#84 01 07 01"},
+        {NULL, NULL},
+    };
+    make_link();
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    exchange_run(&x, refusing);
+    TEST_ASSERT_TRUE(the_input()->enabled);
+    pdcp_arb_audit(x.arb, x.now_ms);
+    exchange_pass(&x, 180);
+    exchange_silence(&x);
+    ask("311#03 04 01", "211#83 01 04 01 00");
+    exchange_pass(&x, 180);
+    exchange_silence(&x);
+    ask("312#03 04 01", "212#83 01 04 01 01");
+    exchange_run(&x, silencing);
+    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+}
+
+/* It may have become silent on its own: then the tables learn it. */
+static void test_an_input_that_was_disabled_by_itself(void)
+{
+    x.arb->bus.nodes.channels[input()].enabled = true;
+    pdcp_arb_audit(x.arb, x.now_ms);
+    exchange_pass(&x, 180);
+    ask("311#03 04 01", "211#83 01 04 01 00");
+    exchange_pass(&x, 180);
+    ask("312#03 04 01", "212#83 01 04 01 00");
+    exchange_silence(&x);
+    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+}
+
 /* D-BUS-38: what an input names is repaired three times within a minute, then it is told once more, and
  * nothing of it is done until the minute is over. */
 static void test_a_source_that_is_not_kept(void)
@@ -617,6 +664,8 @@ int main(void)
     RUN_TEST(test_each_parameter_is_compared);
     RUN_TEST(test_an_input_without_a_link);
     RUN_TEST(test_an_input_whose_source_is_not_decided);
+    RUN_TEST(test_an_input_that_refused_to_be_disabled);
+    RUN_TEST(test_an_input_that_was_disabled_by_itself);
     RUN_TEST(test_a_source_that_is_not_kept);
     RUN_TEST(test_three_repairs_in_more_than_a_minute);
     RUN_TEST(test_an_output_that_is_not_kept);

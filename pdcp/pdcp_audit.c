@@ -128,6 +128,15 @@ static bool ask_on(pdcp_bus_t *bus, pdcp_audit_walk_t walk)
     return false;
 }
 
+/* The same, from the beginning of the walk when it is at its end. False: there is nothing to ask. */
+static bool ask_round(pdcp_bus_t *bus, pdcp_audit_walk_t walk)
+{
+    if (ask_on(bus, walk)) {
+        return true;
+    }
+    return ask_on(bus, walk);
+}
+
 /* Asks what comes next of the devices that go first, one after the other. */
 static bool ask_hurried(pdcp_bus_t *bus)
 {
@@ -149,11 +158,9 @@ static void ask_next(pdcp_bus_t *bus)
 {
     const uint8_t count = bus->audit.count++;
     const bool is_spare_due = count % SPARE_EVERY == SPARE_EVERY - 1;
-    if ((is_spare_due && (ask_on(bus, PDCP_AUDIT_SPARE) || ask_on(bus, PDCP_AUDIT_SPARE))) ||
-        (count % 2 == 0 && ask_hurried(bus)) || ask_on(bus, PDCP_AUDIT_TURN)) {
-        return;
+    if (!(is_spare_due && ask_round(bus, PDCP_AUDIT_SPARE)) && !(count % 2 == 0 && ask_hurried(bus))) {
+        (void)ask_round(bus, PDCP_AUDIT_TURN);
     }
-    (void)ask_on(bus, PDCP_AUDIT_TURN);
 }
 
 static bool is_asking(pdcp_bus_t *bus)

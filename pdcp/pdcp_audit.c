@@ -30,7 +30,7 @@ void pdcp_audit_init(pdcp_bus_t *bus)
 
 void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node)
 {
-    for (uint16_t at = 0; at < WALK_END; at++) {
+    for (unsigned at = 0; at < WALK_END; at++) {
         const uint8_t number = (uint8_t)(at % PDCP_CHANNELS_MAX);
         if (bus->nodes.channels[number].node == node) {
             pdcp_set_bit(bus->audit.refused[at / PDCP_CHANNELS_MAX], number, false);

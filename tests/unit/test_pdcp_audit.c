@@ -506,14 +506,15 @@ static void build_limb(void)
 {
     pdcp_nodes_t *nodes = &x.arb->bus.nodes;
     pdcp_nodes_init(nodes);
-    for (uint8_t place = 0; place < DEVICES; place++) {
+    for (unsigned at = 0; at < DEVICES; at++) {
+        const uint8_t place = (uint8_t)at;
         const pdcp_identity_t identity = {2, 2, (uint16_t)(place + 1)};
         pdcp_nodes_add(nodes, place, &identity, (uint8_t)(place + 1));
         nodes->nodes[place].state = PDCP_NODE_READY;
         nodes->nodes[place].ack_ms = 100;
         TEST_ASSERT_TRUE(pdcp_nodes_set_channels(nodes, place, CHANNELS / DEVICES));
     }
-    for (uint8_t i = 0; i < CHANNELS; i++) {
+    for (unsigned i = 0; i < CHANNELS; i++) {
         pdcp_channel_t *channel = &nodes->channels[i];
         channel->transfer = i % 4 < 2 ? PDCP_OUTPUT : PDCP_INPUT;
         channel->enabled = true;
@@ -521,7 +522,7 @@ static void build_limb(void)
             pdcp_nodes_set_output_id(nodes, channel, (uint8_t)(254 - i));
         }
     }
-    for (uint8_t i = 2; i < CHANNELS; i = (uint8_t)(i % 4 == 2 ? i + 1 : i + 3)) {
+    for (unsigned i = 2; i < CHANNELS; i += i % 4 == 2 ? 1 : 3) {
         pdcp_channel_t *channel = &nodes->channels[i];
         channel->feed = (uint8_t)((i + 2) % CHANNELS); /* an output of the next device */
         channel->source = nodes->nodes[nodes->channels[channel->feed].node].identity;
@@ -611,7 +612,7 @@ static void audit_limb(void)
     TEST_ASSERT_LESS_THAN_UINT32(3 * LIMIT_MS * BITS_A_MS / 100, bus_bits); /* 1 % */
 }
 
-static void expect_asked(uint8_t number, uint8_t param)
+static void expect_asked(unsigned number, uint8_t param)
 {
     TEST_ASSERT_GREATER_THAN_UINT32(2 * LIMIT_MS, last_ms[number][param - 4]);
 }
@@ -622,7 +623,7 @@ static void test_a_turn_of_64_links(void)
     exchange_start(&x, 0xFFFFFF00u);
     build_limb();
     audit_limb();
-    for (uint8_t i = 0; i < CHANNELS; i++) {
+    for (unsigned i = 0; i < CHANNELS; i++) {
         expect_asked(i, 4);
         expect_asked(i, 5);
         if (i % 4 >= 2) {
@@ -640,7 +641,7 @@ static void test_a_turn_with_channels_that_have_no_link(void)
 {
     exchange_start(&x, 0xFFFFFF00u);
     build_limb();
-    for (uint8_t i = 0; i < CHANNELS; i++) {
+    for (unsigned i = 0; i < CHANNELS; i++) {
         pdcp_channel_t *channel = &x.arb->bus.nodes.channels[i];
         if (i % 4 < 2) {
             channel->enabled = i == 0;
@@ -652,7 +653,7 @@ static void test_a_turn_with_channels_that_have_no_link(void)
     }
     audit_limb();
     TEST_ASSERT_EQUAL(asked / 4, spare);
-    for (uint8_t i = 0; i < CHANNELS; i++) {
+    for (unsigned i = 0; i < CHANNELS; i++) {
         expect_asked(i, 4);
     }
 }

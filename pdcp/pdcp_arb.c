@@ -116,6 +116,7 @@ static void take_down(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_node_t *device = node_of(arb, node);
     device->state = PDCP_NODE_LOST;
+    pdcp_suspend_on_lost(&arb->bus, node);
     pdcp_request_cancel(&arb->bus, node);
     pdcp_link_on_lost(&arb->bus, node);
     reset_ends(arb, node, PDCP_ERR_NO_ANSWER);
@@ -134,7 +135,6 @@ static void begin_setup(pdcp_arb_t *arb, uint8_t node)
     device->setup_again = false;
     device->heard_ms = arb->bus.now_ms;
     device->taken_back = false;
-    arb->bus.suspend.left[node] = 0;
     pdcp_setup_start(&arb->bus, node);
     expect_life(arb, node);
 }
@@ -156,6 +156,7 @@ static void after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result)
         take_down(arb, node); /* it was reset: what was known of its channels' state is gone */
     }
     begin_setup(arb, node);
+    pdcp_suspend_on_bound(&arb->bus, node);
     if (!pdcp_bind_is_known(&arb->bus, &node_of(arb, node)->identity)) {
         set_life(arb, node, PDCP_GHOST_MS);
     }
@@ -540,6 +541,7 @@ static bool on_beacon(pdcp_arb_t *arb, pdcp_node_t *device)
     if (device->state == PDCP_NODE_LOST) {
         begin_setup(arb, device->place); /* reads who it is before anything else (D-BUS-15) */
         device->taken_back = true;
+        pdcp_bus_wake(&arb->bus, PDCP_TIMER_RELEASE, PDCP_RELEASE_MS); /* if it was suspended meanwhile */
         serve(arb, device->place);
     }
     device->beaconed = true;
@@ -660,6 +662,8 @@ static void on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
         pdcp_link_on_reply(&arb->bus, reply);
     } else if (reply->client == PDCP_CLIENT_RESET) {
         reset_on_reply(arb, node, status);
+    } else if (reply->client == PDCP_CLIENT_AUDIT && reply->code == PDCP_RELEASE) {
+        pdcp_suspend_on_reply(&arb->bus, node, status);
     } else if (reply->client == PDCP_CLIENT_AUDIT) {
         pdcp_audit_on_reply(&arb->bus, reply);
     } else if (reply->client == PDCP_CLIENT_HOST || reply->client == PDCP_CLIENT_RAW) {

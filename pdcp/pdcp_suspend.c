@@ -2,9 +2,6 @@
 
 #include "pdcp_bus.h"
 
-/* Most Releases at once: half of the transmit queue is left to others. */
-enum { RELEASES_MAX = PDCP_TX_MAX / 2 };
-
 /* Beacons until a time is over. The first one may leave at once, and a part of the last interval counts as a
  * whole one: up to a second too many, and none too few. */
 static uint8_t beacons_in(uint16_t time_ms)
@@ -32,6 +29,13 @@ void pdcp_suspend_on_beacon(pdcp_bus_t *bus)
     }
 }
 
+static void wake(pdcp_bus_t *bus, uint16_t in_ms)
+{
+    if (!pdcp_timers_is_set(&bus->timers, PDCP_TIMER_RELEASE)) {
+        pdcp_bus_wake(bus, PDCP_TIMER_RELEASE, in_ms);
+    }
+}
+
 void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
@@ -39,32 +43,55 @@ void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
             pdcp_set_bit(bus->suspend.release, i, true);
         }
     }
-    if (!pdcp_timers_is_set(&bus->timers, PDCP_TIMER_RELEASE)) {
-        pdcp_bus_wake(bus, PDCP_TIMER_RELEASE, PDCP_RELEASE_MS);
+    wake(bus, PDCP_RELEASE_MS);
+}
+
+void pdcp_suspend_on_reply(pdcp_bus_t *bus, uint8_t node, pdcp_status_t status)
+{
+    if (status == PDCP_ERR_NO_ANSWER) {
+        pdcp_set_bit(bus->suspend.release, node, true);
+        wake(bus, PDCP_RELEASE_AGAIN_MS);
     }
 }
 
-/* Does a device have to be told? */
-static bool is_due(const pdcp_bus_t *bus, uint8_t node)
+void pdcp_suspend_on_lost(pdcp_bus_t *bus, uint8_t node)
+{
+    const pdcp_request_t *request = &pdcp_bus_node(bus, node)->request;
+    if (request->state != PDCP_REQUEST_IDLE && request->client == PDCP_CLIENT_AUDIT &&
+        request->code == PDCP_RELEASE) {
+        pdcp_set_bit(bus->suspend.release, node, true);
+    }
+}
+
+void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t node)
+{
+    bus->suspend.left[node] = 0;
+    pdcp_set_bit(bus->suspend.release, node, false);
+}
+
+/* Tells a device Release if it is to be told and can be. False: it is to be told later. */
+static bool release(pdcp_bus_t *bus, uint8_t node)
 {
     const uint8_t state = bus->nodes.nodes[node].state;
-    return pdcp_bit(bus->suspend.release, node) && bus->suspend.left[node] == 0 &&
-           (state == PDCP_NODE_SETUP || state == PDCP_NODE_READY || state == PDCP_NODE_FAILED);
+    if (!pdcp_bit(bus->suspend.release, node) || state == PDCP_NODE_LOST) {
+        return true; /* one that is lost is told when it is back */
+    }
+    if (!pdcp_request_is_idle(bus, node) || bus->txq.count > PDCP_TX_MAX / 2) {
+        return false;
+    }
+    pdcp_set_bit(bus->suspend.release, node, false);
+    if (bus->suspend.left[node] == 0 &&
+        (state == PDCP_NODE_SETUP || state == PDCP_NODE_READY || state == PDCP_NODE_FAILED)) {
+        pdcp_request_command(bus, node, PDCP_CLIENT_AUDIT, PDCP_RELEASE, 0);
+    }
+    return true;
 }
 
 void pdcp_suspend_on_deadline(pdcp_bus_t *bus)
 {
-    uint8_t told = 0;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        const bool due = is_due(bus, i);
-        if (due && (told == RELEASES_MAX || !pdcp_request_is_idle(bus, i))) {
-            pdcp_bus_wake(bus, PDCP_TIMER_RELEASE, PDCP_RELEASE_MS);
-            continue;
-        }
-        pdcp_set_bit(bus->suspend.release, i, false);
-        if (due) {
-            pdcp_request_command(bus, i, PDCP_CLIENT_AUDIT, PDCP_RELEASE, 0);
-            told++;
+        if (!release(bus, i)) {
+            wake(bus, PDCP_RELEASE_MS);
         }
     }
 }

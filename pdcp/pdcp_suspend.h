@@ -11,12 +11,14 @@
 
 #include "pdcp_bits.h"
 #include "pdcp_limits.h"
+#include "pdcp_request.h"
 
 struct pdcp_bus;
 
 enum {
     PDCP_SUSPENDED_FOR_GOOD = 0xFF, /* until released */
-    PDCP_RELEASE_MS = 10 /* from somebody else's Suspend to the Release, and to the next Releases */
+    PDCP_RELEASE_MS = 10,        /* from somebody else's Suspend to the Release, and to the next Releases */
+    PDCP_RELEASE_AGAIN_MS = 1000 /* until a device that did not answer is told again */
 };
 
 /* All 0: nobody is suspended. */
@@ -32,11 +34,21 @@ typedef struct {
  */
 void pdcp_suspend_on_host(struct pdcp_bus *bus, uint8_t node, uint8_t code, uint16_t time_ms);
 
+/* A device was bound: it is not suspended. */
+void pdcp_suspend_on_bound(struct pdcp_bus *bus, uint8_t node);
+
 /* Somebody else has sent Suspend to this node id, 0: to all. */
 void pdcp_suspend_on_foreign(struct pdcp_bus *bus, uint8_t node_id);
 
 /* A beacon of the arbitrator leaves: half a second has passed. */
 void pdcp_suspend_on_beacon(struct pdcp_bus *bus);
+
+/* A device is lost, its request not yet cancelled: a Release that was not answered is due again when it is
+ * back. */
+void pdcp_suspend_on_lost(struct pdcp_bus *bus, uint8_t node);
+
+/* A device was told Release. */
+void pdcp_suspend_on_reply(struct pdcp_bus *bus, uint8_t node, pdcp_status_t status);
 
 /* PDCP_TIMER_RELEASE is due: devices are told Release as their places are free. */
 void pdcp_suspend_on_deadline(struct pdcp_bus *bus);

@@ -93,13 +93,72 @@ static void test_a_busy_device_is_released_later(void)
     exchange_tx(&x, "311#09");
 }
 
-/* One that is gone before is not told. */
-static void test_a_lost_device_is_not_released(void)
+/* One that does not answer is told again, a second later. */
+static void test_a_mute_device_is_released_later(void)
 {
-    exchange_pass(&x, 1495);
     exchange_rx(&x, "311#08 0000");
-    exchange_pass(&x, 30);
+    exchange_pass(&x, 10);
+    for (int i = 0; i < 3; i++) {
+        exchange_tx(&x, "311#09");
+        exchange_pass(&x, 100);
+    }
+    exchange_beacons(&x);
+    exchange_pass(&x, 999);
     exchange_silence(&x);
+    exchange_pass(&x, 1);
+    exchange_tx(&x, "311#09");
+    exchange_rx(&x, "211#89 01");
+    exchange_beacons(&x);
+    exchange_pass(&x, 1200);
+    exchange_silence(&x);
+}
+
+/* One that is lost is told when it is back, if it was not reset meanwhile (D-BUS-15). */
+static void test_a_lost_device_is_released_when_it_is_back(void)
+{
+    static const exchange_pair_t pairs[] = {
+        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
+        {"311#03 02 00", "211#83 01 02 00 0400"},
+        {"311#03 06 00", "211#83 00 06 00"},
+        {"311#03 0B 00", "211#83 00 0B 00"},
+        {"311#03 0A 00", "211#83 00 0A 00"},
+        {"311#03 09 00", "211#83 01 09 00 01"},
+        {"311#04 04 01 00", "211#84 01 04 01 00"},
+        {"311#03 03 01", "211#83 01 03 01 02"},
+        {"311#03 01 01", "211#83 01 01 01 0050 2021"},
+        {"311#03 09 01", "211#83 00 09 01"},
+        {"311#03 0A 01", "211#83 00 0A 01"},
+        {"311#04 05 01 FE", "211#84 01 05 01 FE"},
+        {NULL, NULL},
+    };
+    exchange_pass(&x, 1495);
+    exchange_rx(&x, "311#08 0000"); /* just before it is lost */
+    exchange_pass(&x, 500);
+    exchange_silence(&x);
+    exchange_rx(&x, "311#08 0000"); /* and once more while it is */
+    exchange_pass(&x, 500);
+    exchange_silence(&x);
+    exchange_rx(&x, "011#0A");
+    exchange_run(&x, pairs);
+    exchange_pass(&x, 10);
+    exchange_tx(&x, "311#09");
+    exchange_rx(&x, "211#89 01");
+}
+
+/* It was lost before it could answer. */
+static void test_a_device_that_is_lost_before_it_answers(void)
+{
+    exchange_pass(&x, 1400);
+    exchange_rx(&x, "311#08 0000");
+    exchange_pass(&x, 10);
+    exchange_tx(&x, "311#09");
+    exchange_pass(&x, 200); /* lost */
+    TEST_ASSERT_EQUAL(2, exchange_count(&x, PDCP_EVENT_LOST));
+    exchange_rx(&x, "011#0A");
+    exchange_tx(&x, "311#03 01 00");
+    exchange_pass(&x, 100);
+    (void)exchange_drain(&x);
+    TEST_ASSERT_TRUE(pdcp_bit(x.arb->bus.suspend.release, 0));
 }
 
 /* Suspended by the host, until released. */
@@ -219,7 +278,9 @@ int main(void)
     RUN_TEST(test_what_is_no_suspend);
     RUN_TEST(test_a_flood_of_suspends);
     RUN_TEST(test_a_busy_device_is_released_later);
-    RUN_TEST(test_a_lost_device_is_not_released);
+    RUN_TEST(test_a_mute_device_is_released_later);
+    RUN_TEST(test_a_lost_device_is_released_when_it_is_back);
+    RUN_TEST(test_a_device_that_is_lost_before_it_answers);
     RUN_TEST(test_what_the_host_has_suspended_stays_so);
     RUN_TEST(test_a_suspension_for_a_time);
     RUN_TEST(test_a_suspension_that_was_refused);

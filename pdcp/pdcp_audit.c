@@ -8,7 +8,7 @@ enum {
     SPARE_EVERY = 4,                   /* of so many questions one is for a channel without a link */
     WINDOW = 60000 / PDCP_AUDIT_MS,    /* a minute */
     TOO_MANY = PDCP_AUDIT_REPAIRS + 2, /* differences, of which the host is told no more */
-    WALK_END = PDCP_AUDIT_PARAMS * PDCP_CHANNELS_MAX
+    WALK_END = PDCP_AUDIT_KINDS * PDCP_CHANNELS_MAX
 };
 
 void pdcp_audit_begin(pdcp_bus_t *bus)
@@ -58,10 +58,12 @@ static bool is_output(const pdcp_channel_t *channel)
     return channel->transfer == PDCP_OUTPUT;
 }
 
-/* Does this parameter tell what an input names as its source? Of an output, 5 is its node id. */
-static bool names_source(const pdcp_channel_t *channel, uint8_t param)
+/* The parameter that a question is for. */
+static uint8_t param_of(const pdcp_channel_t *channel, uint8_t kind)
 {
-    return !is_output(channel) && (param == PDCP_IN_SOURCE_VID_PID || param == PDCP_IN_SOURCE_SERIAL);
+    static const uint8_t params[PDCP_AUDIT_KINDS] = {PDCP_CH_ENABLED, PDCP_IN_SOURCE_NODES,
+                                                     PDCP_IN_SOURCE_VID_PID, PDCP_IN_SOURCE_SERIAL};
+    return kind == PDCP_AUDIT_NODES && is_output(channel) ? (uint8_t)PDCP_OUT_NODE_ID : params[kind];
 }
 
 /* Is the channel an end of an active link? */
@@ -74,35 +76,42 @@ static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
     return channel->enabled && pdcp_link_listener(bus, number) != PDCP_NONE;
 }
 
-/* Is the input to be asked for this parameter, which names its source? Without a link it must name none,
- * which parameter 6 tells, but not while the tables have one for it: whether it gets that link is still to be
- * decided. */
-static bool is_source_asked(const pdcp_channel_t *input, uint8_t param)
+/* Is the input to be asked what it names as its source? Without a link it must name none, which parameter 6
+ * tells, but not while the tables have one for it: whether it gets that link is still to be decided. */
+static bool is_source_asked(const pdcp_channel_t *input, uint8_t kind)
 {
     return input->link != PDCP_LINK_NONE ||
-           (param == PDCP_IN_SOURCE_SERIAL && !pdcp_nodes_is_named(input->source_index));
+           (kind == PDCP_AUDIT_SERIAL && !pdcp_nodes_is_named(input->source_index));
 }
 
-/* Is this parameter of the channel asked on this walk? */
-static bool is_asked(const pdcp_bus_t *bus, uint8_t number, uint8_t param, pdcp_audit_walk_t walk)
+/* Is this question asked on this walk? */
+static bool is_asked(const pdcp_bus_t *bus, uint8_t number, uint8_t kind, pdcp_audit_walk_t walk)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
-    if (walk != PDCP_AUDIT_TURN && param == PDCP_CH_ENABLED && !is_linked(bus, number)) {
-        return true;
+    if (kind <= PDCP_AUDIT_NODES && is_linked(bus, number)) {
+        return walk != PDCP_AUDIT_SPARE;
     }
-    if (walk == PDCP_AUDIT_SPARE) {
-        return false;
+    if (kind <= PDCP_AUDIT_NODES || walk == PDCP_AUDIT_SPARE) {
+        return walk != PDCP_AUDIT_TURN && kind == PDCP_AUDIT_ENABLED;
     }
-    if (names_source(channel, param)) {
-        return bus->link.planned && is_source_asked(channel, param);
-    }
-    return param <= (is_output(channel) ? PDCP_OUT_NODE_ID : PDCP_IN_SOURCE_NODES) && is_linked(bus, number);
+    return !is_output(channel) && bus->link.planned && is_source_asked(channel, kind);
 }
 
 static bool may_ask(pdcp_bus_t *bus, uint8_t node)
 {
     return node != PDCP_NONE && pdcp_bus_node(bus, node)->state == PDCP_NODE_READY &&
            pdcp_request_is_idle(bus, node);
+}
+
+static void ask(pdcp_bus_t *bus, uint8_t number, uint8_t kind)
+{
+    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    bus->audit.asked = number;
+    bus->audit.asked_kind = kind;
+    bus->audit.asked_place = channel->node;
+    pdcp_request_get(bus, channel->node, PDCP_CLIENT_AUDIT, channel->index, param_of(channel, kind),
+                     PDCP_VALUE_MAX);
+    pdcp_request_limit_tries(bus, channel->node, 1);
 }
 
 /* Asks what comes next on a walk. False: it is at its end, and begins anew. */
@@ -112,15 +121,11 @@ static bool ask_on(pdcp_bus_t *bus, pdcp_audit_walk_t walk)
     while (audit->at[walk] < WALK_END) {
         const uint8_t number = (uint8_t)(audit->at[walk] % PDCP_CHANNELS_MAX);
         const uint8_t kind = (uint8_t)(audit->at[walk] / PDCP_CHANNELS_MAX);
-        const uint8_t param = (uint8_t)(PDCP_AUDIT_FIRST + kind);
-        const pdcp_channel_t *channel = &bus->nodes.channels[number];
+        const uint8_t node = bus->nodes.channels[number].node;
         audit->at[walk]++;
-        if ((walk != PDCP_AUDIT_HURRY || channel->node == audit->first) && may_ask(bus, channel->node) &&
-            !pdcp_bit(audit->refused[kind], number) && is_asked(bus, number, param, walk)) {
-            audit->asked = number;
-            audit->asked_place = channel->node;
-            pdcp_request_get(bus, channel->node, PDCP_CLIENT_AUDIT, channel->index, param, PDCP_VALUE_MAX);
-            pdcp_request_limit_tries(bus, channel->node, 1);
+        if ((walk != PDCP_AUDIT_HURRY || node == audit->first) && may_ask(bus, node) &&
+            !pdcp_bit(audit->refused[kind], number) && is_asked(bus, number, kind, walk)) {
+            ask(bus, number, kind);
             return true;
         }
     }
@@ -188,13 +193,13 @@ static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
     const uint8_t first = pdcp_value_u8(reply->bytes, reply->len, 0);
-    if (reply->param == PDCP_CH_ENABLED) {
+    if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED) {
         return (first != 0) == is_linked(bus, number);
     }
     if (is_output(channel)) {
         return first == channel->node_id;
     }
-    if (reply->param == PDCP_IN_SOURCE_NODES) {
+    if (bus->audit.asked_kind == PDCP_AUDIT_NODES) {
         const pdcp_channel_t *source = &bus->nodes.channels[channel->feed];
         return first == pdcp_bus_node(bus, source->node)->node_id &&
                pdcp_value_u8(reply->bytes, reply->len, 1) == source->node_id;
@@ -236,16 +241,17 @@ static void let_go(pdcp_bus_t *bus, uint8_t number, uint8_t input)
 }
 
 /* Repairs what differs. An output stands for the first of its links. */
-static void on_difference(pdcp_bus_t *bus, uint8_t number, uint8_t param)
+static void on_difference(pdcp_bus_t *bus, uint8_t number)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const uint8_t kind = bus->audit.asked_kind;
+    const bool source = kind > PDCP_AUDIT_NODES;
     const bool linked = is_linked(bus, number);
-    const bool source = names_source(channel, param);
     const uint8_t input = is_output(channel) && linked ? pdcp_link_listener(bus, number) : number;
     const uint8_t times = count_difference(&bus->audit, input, source);
     pdcp_bus_count(bus, PDCP_STAT_AUDIT);
     if (times < TOO_MANY) {
-        pdcp_bus_tell_link(bus, PDCP_EVENT_AUDIT, number, (pdcp_status_t)param);
+        pdcp_bus_tell_link(bus, PDCP_EVENT_AUDIT, number, (pdcp_status_t)param_of(channel, kind));
     }
     if (!linked && !source) {
         pdcp_link_silence(bus, number);
@@ -259,15 +265,15 @@ static void on_difference(pdcp_bus_t *bus, uint8_t number, uint8_t param)
 void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     const uint8_t number = bus->audit.asked;
-    if (reply->code != PDCP_GET_PARAMETER || number == PDCP_NONE || reply->status == PDCP_ERR_NO_ANSWER) {
-        return; /* a Release; or nothing can be said */
+    if (number == PDCP_NONE || reply->status == PDCP_ERR_NO_ANSWER) {
+        return;
     }
     bus->audit.asked = PDCP_NONE;
     if (reply->status != PDCP_OK) {
-        pdcp_set_bit(bus->audit.refused[reply->param - PDCP_AUDIT_FIRST], number, true);
+        pdcp_set_bit(bus->audit.refused[bus->audit.asked_kind], number, true);
     } else if (!agrees(bus, number, reply)) {
-        on_difference(bus, number, reply->param);
-    } else if (reply->param == PDCP_CH_ENABLED && !is_linked(bus, number)) {
+        on_difference(bus, number);
+    } else if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
         bus->nodes.channels[number].enabled = false; /* it may have refused that before */
     }
 }

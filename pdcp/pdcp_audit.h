@@ -25,15 +25,21 @@
 struct pdcp_bus;
 
 enum {
-    PDCP_AUDIT_MS = 60,       /* between two questions */
-    PDCP_AUDIT_REPAIRS = 3,   /* of one link within a minute */
-    PDCP_AUDIT_FOUND_MAX = 8, /* channels whose differences are counted at a time; those of others are not */
-    PDCP_AUDIT_FIRST = PDCP_CH_ENABLED,     /* parameters that may be asked: 4 */
-    PDCP_AUDIT_LAST = PDCP_IN_SOURCE_NODES, /* to 7 */
-    PDCP_AUDIT_PARAMS = PDCP_AUDIT_LAST - PDCP_AUDIT_FIRST + 1
+    PDCP_AUDIT_MS = 60,      /* between two questions */
+    PDCP_AUDIT_REPAIRS = 3,  /* of one link within a minute */
+    PDCP_AUDIT_FOUND_MAX = 8 /* channels whose differences are counted at a time; those of others are not */
 };
 
-/* The walks over all channels: one parameter of every channel, then the next parameter. */
+/* What may be asked of a channel, what data depend on first. */
+typedef enum {
+    PDCP_AUDIT_ENABLED, /* 4 */
+    PDCP_AUDIT_NODES,   /* an input's 7, an output's 5 */
+    PDCP_AUDIT_SOURCE,  /* an input's 5 */
+    PDCP_AUDIT_SERIAL,  /* an input's 6 */
+    PDCP_AUDIT_KINDS
+} pdcp_audit_kind_t;
+
+/* The walks over all channels: one kind of question for every channel, then the next kind. */
 typedef enum {
     PDCP_AUDIT_TURN,  /* all that is linked */
     PDCP_AUDIT_HURRY, /* the device that goes first: its channels without a link, too */
@@ -52,15 +58,14 @@ typedef struct {
     bool on;             /* it was begun */
     uint8_t count;       /* of questions */
     uint8_t asked;       /* channel number of the question under way; PDCP_NONE: its answer is not compared */
+    uint8_t asked_kind;  /* pdcp_audit_kind_t of the question */
     uint8_t asked_place; /* of the device that was asked last */
     uint8_t first;       /* place of the device that goes first, or did last */
     uint16_t window;     /* what is left of the minute under way, in PDCP_AUDIT_MS; 0: none is */
-    uint16_t
-        at[PDCP_AUDIT_WALKS]; /* where each walk is: (parameter - 4) * PDCP_CHANNELS_MAX + channel number */
+    uint16_t at[PDCP_AUDIT_WALKS]; /* where each walk is: kind * PDCP_CHANNELS_MAX + channel number */
     pdcp_audit_found_t found[PDCP_AUDIT_FOUND_MAX];
-    uint8_t hurried[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)]; /* set of places: to go first */
-    uint8_t refused[PDCP_AUDIT_PARAMS]
-                   [PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)]; /* sets of channels, by parameter */
+    uint8_t hurried[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)];                    /* set of places: to go first */
+    uint8_t refused[PDCP_AUDIT_KINDS][PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)]; /* sets of channels, by kind */
 } pdcp_audit_t;
 
 /* Nothing is known of the bus. What was begun goes on. */
@@ -81,7 +86,7 @@ void pdcp_audit_on_change(struct pdcp_bus *bus);
 /* PDCP_TIMER_AUDIT is due; calm: nothing else is to be done, so a question may be asked. */
 void pdcp_audit_on_deadline(struct pdcp_bus *bus, bool calm);
 
-/* A reply to a request of PDCP_CLIENT_AUDIT. */
+/* A reply to a question. */
 void pdcp_audit_on_reply(struct pdcp_bus *bus, const pdcp_reply_t *reply);
 
 #endif

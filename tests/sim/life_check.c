@@ -234,7 +234,7 @@ static void check_source(const limb_t *limb, const limb_part_t *part, const pdcp
     const pdcp_device_source_t *named = pdcp_device_source(sim_node_device(part->node), input->index);
     const bool names_one = named->channel != PDCP_NO_SOURCE_INDEX && named->channel != 0;
     const bool has_source = input->link != PDCP_LINK_NONE;
-    if (pdcp_bit(limb->app.arb.bus.audit.refused[PDCP_IN_SOURCE_SERIAL - PDCP_AUDIT_FIRST], number)) {
+    if (pdcp_bit(limb->app.arb.bus.audit.refused[PDCP_AUDIT_SERIAL], number)) {
         return;
     }
     if (names_one != has_source || (has_source && (!pdcp_identity_equal(&named->identity, &input->source) ||

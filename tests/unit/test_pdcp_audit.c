@@ -86,9 +86,9 @@ static void test_a_turn_with_the_profile_layer(void)
         ask("311#03 04 01", "211#83 01 04 01 01");
         ask("312#03 04 01", "212#83 01 04 01 01");
         ask("311#03 05 01", "211#83 01 05 01 FE");
+        ask("312#03 07 01", "212#83 01 07 01 11 FE");
         ask("312#03 05 01", "212#83 01 05 01 0200 0200");
         ask("312#03 06 01", "212#83 01 06 01 0400 01");
-        ask("312#03 07 01", "212#83 01 07 01 11 FE");
     }
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
     TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
@@ -109,12 +109,12 @@ static void test_each_parameter_is_compared(void)
     ask("311#03 04 01", "211#83 01 04 01 01 00");
     ask("312#03 04 01", "212#83 01 04 01 FF");
     ask("311#03 05 01", "211#83 01 05 01 FE 00");
+    ask("312#03 07 01", "212#83 01 07 01 11 FD");
+    expect_repair(input(), 7);
     ask("312#03 05 01", "212#83 01 05 01 0200 0300");
     expect_repair(input(), 5);
     ask("312#03 06 01", "212#83 01 06 01 0400 02");
     expect_repair(input(), 6);
-    ask("312#03 07 01", "212#83 01 07 01 11 FD");
-    expect_repair(input(), 7);
     TEST_ASSERT_EQUAL(3, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
@@ -205,6 +205,7 @@ static void test_a_source_that_is_not_kept(void)
         ask("311#03 04 01", "211#83 01 04 01 01");
         ask("312#03 04 01", "212#83 01 04 01 01");
         ask("311#03 05 01", "211#83 01 05 01 FE");
+        ask("312#03 07 01", "212#83 01 07 01 11 FE");
         ask("312#03 05 01", "212#83 01 05 01 0900 0900");
         if (turn < 3) {
             expect_repair(input(), 5);
@@ -214,7 +215,6 @@ static void test_a_source_that_is_not_kept(void)
         }
         exchange_silence(&x);
         ask("312#03 06 01", "212#83 01 06 01 0400 01");
-        ask("312#03 07 01", "212#83 01 07 01 11 FE");
     }
     TEST_ASSERT_EQUAL(6, x.arb->bus.stats[PDCP_STAT_AUDIT]);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link); /* data flows all the same */
@@ -414,9 +414,9 @@ static void test_a_refusal_ends_with_the_next_setup(void)
     ask("311#03 04 01", "211#83 00 04 01");
     ask("312#03 04 01", "212#83 00 04 01");
     ask("311#03 05 01", "211#83 00 05 01");
+    ask("312#03 07 01", "212#83 00 07 01");
     ask("312#03 05 01", "212#83 00 05 01");
     ask("312#03 06 01", "212#83 00 06 01");
-    ask("312#03 07 01", "212#83 00 07 01");
     for (int i = 0; i < 5; i++) {
         exchange_pass(&x, 200);
         exchange_silence(&x);

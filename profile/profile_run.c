@@ -294,14 +294,15 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
     make_due(run, PROFILE_PLAN_SETTLE);
 }
 
-/* The audit has let the link of an input go: it counts as one that could not be made (D-PRO-14), and what
- * requires the input rests (D-BUS-40). */
+/* The audit has let the link of an input go. The pair is left out as one that could not be linked (D-PRO-14),
+ * and what requires the input rests (D-BUS-40). Nothing is put in its place: somebody who disturbs a link
+ * shall not get another limb by it. */
 static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 {
     const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
     run->plan.want[input] = PDCP_NONE;
     ban(run, now_ms, pair);
-    make_due(run, run->at_events);
+    make_due(run, PROFILE_PLAN_SETTLE);
 }
 
 /* Did the last plan, which is done, want a link that does not work any more? While it is about to be made

@@ -20,18 +20,20 @@ from pathlib import Path
 from typing import Any, NamedTuple
 from unittest import mock
 
+import can
 import jsonschema
 import pytest
 from pdcp.cli import app
 from pdcp.cli.common import run
 from pdcp.counters import GROUPS
-from pdcp.events import CanFrame
+from pdcp.events import AuditDifference, CanFrame
 from pdcp.model import ProfileState
 from pdcp.wire import Frame
 from programs import LINE_TIMEOUT_S, Pdcpd, Program, Value, until
 from scripted import ScriptedArbitrator
+from simbus import open_sim_bus
 
-from pdcp import Client, EventKind
+from pdcp import ChannelId, Client, EventKind, Identity
 
 COMMAND = Path(sys.executable).with_name("pdcp")
 SCHEMAS = Path(__file__).resolve().parent / "schemas"
@@ -542,6 +544,42 @@ def test_watch_as_text(quiet: Cli) -> None:
     """One line an event where there is no terminal; ends after so many."""
     lines = quiet.good("watch", "--frames", "--count", "3").output.splitlines()
     assert len(lines) == 3 and all("frame" in line and "#" in line for line in lines)
+
+
+AUDIT = Frame(0x2419, 0, bytes.fromhex("09 A8 61 00 00 02 00 02 00 06 00 01 04"))
+
+
+@pytest.mark.parametrize("option", [[], ["--json"]])
+def test_watch_shows_what_the_audit_finds(option: list[str], scripted: Callable[..., ScriptedArbitrator]) -> None:
+    """D-API-20, kind 9: which channel, and which parameter of it."""
+    peer = scripted(lambda frame: [Frame(0x2417, frame.reference), *([AUDIT] if frame.payload != b"\0" else [])])
+    result = Cli(peer.port).good("watch", "--count", "1", *option)
+    assert peer.requests[0].payload == b"\x2f\x01"
+    if option:
+        expected = {"time_ms": 25000, "kind": 9, "event": "audit", "channel": "2:2:6.1", "parameter": 4}
+        assert result.json("event") == expected
+    else:
+        assert result.words() == "25.000 audit 2:2:6.1 had a wrong parameter 4"
+
+
+def test_the_audit_of_a_limb(limb: Start) -> None:
+    """D-BUS-40: somebody else disables an input of the hand. It is told, and values go on."""
+    pdcpd = limb("--can", "sim:0")
+    cli = Cli(await_limb(pdcpd.port()))
+    values = Values(pdcpd)
+    cli.good("autoconfig", "now")
+    values.await_new()
+    with Client(pdcpd.port()) as client, open_sim_bus(pdcpd.bus_port()) as bus:
+        hand = next(device for device in client.devices() if device.identity == Identity(2, 2, 6))
+        node_id = client.get_parameter(hand.id, 8)[0]
+        client.stream((EventKind.AUDIT,))
+        bus.send(can.Message(arbitration_id=0x300 | node_id, data=b"\x04\x04\x01\x00", is_extended_id=False))
+        event = next(client.events(LINE_TIMEOUT_S))
+        assert isinstance(event, AuditDifference)
+        assert (event.channel, event.parameter) == (ChannelId(Identity(2, 2, 6), 1), 4)
+        client.stream(())
+        until(lambda: client.get_parameter(ChannelId(Identity(2, 2, 6), 1), 4) == b"\x01", "the input is enabled again")
+    values.await_new()
 
 
 def test_watch_for_a_time(scripted: Callable[..., ScriptedArbitrator]) -> None:

@@ -302,7 +302,7 @@ def test_statistics(run: Run, arbitrator: Make) -> None:
     peer = arbitrator(answers({(0x2413, b"\0"): (0x2414, b"\0" + many), (0x2413, b"\1"): (0x2414, b"\1" + many[:8])}))
     ((bus, host),) = run(peer.port, lambda c: c.all_stats())
     assert (bus.name, host.name) == ("bus", "host")
-    assert bus["rx"] == 0 and bus["tx"] == 1 and bus["bus_off"] == 34 and bus["counter_35"] == 35
+    assert bus["rx"] == 0 and bus["tx"] == 1 and bus["audit"] == 35 and bus["counter_36"] == 36
     assert [counter.value for counter in host.counters] == [0, 1]
 
 

@@ -193,8 +193,11 @@ static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
     const uint8_t first = pdcp_value_u8(reply->bytes, reply->len, 0);
+    if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
+        return first == 0 || (is_output(channel) && channel->enabled); /* by the host, who reads it */
+    }
     if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED) {
-        return (first != 0) == is_linked(bus, number);
+        return first != 0;
     }
     if (is_output(channel)) {
         return first == channel->node_id;
@@ -274,6 +277,7 @@ void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     } else if (!agrees(bus, number, reply)) {
         on_difference(bus, number);
     } else if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
-        bus->nodes.channels[number].enabled = false; /* it may have refused that before */
+        /* What was to be disabled may have refused that before. */
+        bus->nodes.channels[number].enabled = pdcp_value_u8(reply->bytes, reply->len, 0) != 0;
     }
 }

@@ -182,6 +182,18 @@ static void test_an_input_that_refused_to_be_disabled(void)
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
+/* A host may read an output without a link: what it has enabled stays enabled. */
+static void test_an_output_that_the_host_has_enabled(void)
+{
+    x.arb->bus.nodes.channels[output()].enabled = true;
+    pdcp_arb_audit(x.arb, x.now_ms);
+    exchange_pass(&x, 180);
+    ask("311#03 04 01", "211#83 01 04 01 01");
+    exchange_silence(&x);
+    TEST_ASSERT_TRUE(x.arb->bus.nodes.channels[output()].enabled);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
+}
+
 /* It may have become silent on its own: then the tables learn it. */
 static void test_an_input_that_was_disabled_by_itself(void)
 {
@@ -667,6 +679,7 @@ int main(void)
     RUN_TEST(test_an_input_whose_source_is_not_decided);
     RUN_TEST(test_an_input_that_refused_to_be_disabled);
     RUN_TEST(test_an_input_that_was_disabled_by_itself);
+    RUN_TEST(test_an_output_that_the_host_has_enabled);
     RUN_TEST(test_a_source_that_is_not_kept);
     RUN_TEST(test_three_repairs_in_more_than_a_minute);
     RUN_TEST(test_an_output_that_is_not_kept);

@@ -36,6 +36,10 @@ void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node)
             pdcp_set_bit(bus->audit.refused[at / PDCP_CHANNELS_MAX], number, false);
         }
     }
+    if (bus->audit.asleep) {
+        bus->audit.asleep = false;
+        pdcp_bus_wake(bus, PDCP_TIMER_AUDIT, PDCP_AUDIT_MS);
+    }
 }
 
 void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
@@ -174,13 +178,28 @@ static bool is_asking(pdcp_bus_t *bus)
     return !pdcp_request_is_idle(bus, node) && pdcp_bus_node(bus, node)->request.client == PDCP_CLIENT_AUDIT;
 }
 
+static bool is_anybody_ready(const pdcp_bus_t *bus)
+{
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        if (bus->nodes.nodes[i].state == PDCP_NODE_READY) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Without devices an arbitrator sleeps from beacon to beacon. */
 void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
 {
     pdcp_audit_t *audit = &bus->audit;
-    pdcp_bus_wake(bus, PDCP_TIMER_AUDIT, PDCP_AUDIT_MS);
     if (audit->window != 0 && --audit->window == 0) {
         memset(audit->found, 0, sizeof audit->found);
     }
+    audit->asleep = audit->window == 0 && !is_anybody_ready(bus);
+    if (audit->asleep) {
+        return;
+    }
+    pdcp_bus_wake(bus, PDCP_TIMER_AUDIT, PDCP_AUDIT_MS);
     if (calm && !is_asking(bus)) {
         ask_next(bus);
     }

@@ -56,6 +56,7 @@ typedef struct {
 
 typedef struct {
     bool on;             /* it was begun */
+    bool asleep;         /* no device is ready: the timer does not run */
     uint8_t count;       /* of questions */
     uint8_t asked;       /* channel number of the question under way; PDCP_NONE: its answer is not compared */
     uint8_t asked_kind;  /* pdcp_audit_kind_t of the question */

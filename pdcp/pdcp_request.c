@@ -352,6 +352,8 @@ bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t node, pdcp_reply_t *reply
     if (request->state == PDCP_REQUEST_GET_DATA) {
         return restart_bulk(bus, device, reply);
     }
-    pdcp_bus_count(bus, PDCP_STAT_NO_ANSWER);
+    if (request->client != PDCP_CLIENT_AUDIT) { /* which asks again, and whose one try may be lost */
+        pdcp_bus_count(bus, PDCP_STAT_NO_ANSWER);
+    }
     return finish(bus, device, PDCP_ERR_NO_ANSWER, reply);
 }

@@ -21,6 +21,7 @@
 #include "arb_port.h"
 #include "arb_store.h"
 #include "pdcp_arb.h"
+#include "pdcp_bits.h"
 
 enum {
     ARB_HELD_MAX = 4,             /* D-API-3 */
@@ -55,8 +56,8 @@ typedef struct {
     uint16_t value_len;
     uint32_t since_ms;
     uint32_t until_ms;
-    uint8_t asked[(PDCP_DEVICES_MAX + 7) / 8]; /* 230Dh: places of the devices that are to be reset */
-    uint8_t reset[(PDCP_DEVICES_MAX + 7) / 8]; /* and that were */
+    uint8_t asked[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)]; /* 230Dh: places of the devices that are to be reset */
+    uint8_t reset[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)]; /* and that were */
 } arb_turn_t;
 
 /* What is counted, since the start. */

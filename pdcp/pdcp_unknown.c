@@ -30,28 +30,12 @@ static uint8_t ticks_since(const pdcp_unknown_t *unknown, uint8_t tick)
     return (uint8_t)(now >= tick ? now - tick : now + TICKS - tick);
 }
 
-static uint8_t mask_of(uint8_t id)
-{
-    return (uint8_t)(1u << (id % 8u));
-}
-
-static bool has(const uint8_t *set, uint8_t id)
-{
-    return (set[id / 8] & mask_of(id)) != 0;
-}
-
-static void put(uint8_t *set, uint8_t id, bool is_in)
-{
-    uint8_t *byte = &set[id / 8];
-    *byte = (uint8_t)(is_in ? *byte | mask_of(id) : *byte & ~mask_of(id));
-}
-
 /* Notes the tick of a frame, or of a Reset. */
 static void set_tick(pdcp_unknown_t *unknown, uint8_t id, uint8_t tick, bool told)
 {
     unknown->heard[id] = tick;
-    put(unknown->told, id, told);
-    put(unknown->answered, id, false);
+    pdcp_set_bit(unknown->told, id, told);
+    pdcp_set_bit(unknown->answered, id, false);
 }
 
 /* Forgets what is too old to matter, before its tick comes round again. */
@@ -87,14 +71,14 @@ void pdcp_unknown_on_time(pdcp_unknown_t *unknown, uint32_t now_ms)
 /* Was it told to reset less than a second ago? */
 static bool is_told(const pdcp_unknown_t *unknown, uint8_t id)
 {
-    return has(unknown->told, id) && ticks_since(unknown, unknown->heard[id]) < PDCP_UNKNOWN_RESET_PAUSE;
+    return pdcp_bit(unknown->told, id) && ticks_since(unknown, unknown->heard[id]) < PDCP_UNKNOWN_RESET_PAUSE;
 }
 
 void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_on_time(unknown, now_ms);
     if (is_told(unknown, id)) { /* the time of the Reset stays, for its pause */
-        put(unknown->answered, id, false);
+        pdcp_set_bit(unknown->answered, id, false);
     } else {
         set_tick(unknown, id, unknown->tick, false);
     }
@@ -103,7 +87,7 @@ void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_note(unknown, now_ms, id);
-    put(unknown->answered, id, is_told(unknown, id));
+    pdcp_set_bit(unknown->answered, id, is_told(unknown, id));
 }
 
 bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
@@ -120,7 +104,7 @@ bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 uint8_t pdcp_unknown_silence(const pdcp_unknown_t *unknown, uint8_t id)
 {
     const uint8_t tick = unknown->heard[id];
-    if (tick == 0 || has(unknown->answered, id)) {
+    if (tick == 0 || pdcp_bit(unknown->answered, id)) {
         return PDCP_UNKNOWN_QUIET;
     }
     const uint8_t ticks = ticks_since(unknown, tick);

@@ -9,6 +9,8 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pdcp_bits.h"
+
 enum {
     PDCP_UNKNOWN_IDS = 256,
     PDCP_UNKNOWN_TICK_MS = 100,
@@ -21,10 +23,10 @@ typedef struct {
     uint8_t tick;                    /* its number, 1 to 255, then 1 again */
     uint8_t swept;                   /* tick of the last sweep */
     uint8_t heard[PDCP_UNKNOWN_IDS]; /* by node id: tick of the last frame, or of the last Reset; 0: quiet */
-    uint8_t answered[PDCP_UNKNOWN_IDS /
-                     8]; /* by node id: whoever was told has answered, and was not heard since */
-    uint8_t
-        told[PDCP_UNKNOWN_IDS / 8]; /* by node id: heard[] is the tick of a Reset, less than a second ago */
+    /* Sets of node ids: whoever was told to reset has answered, and was not heard since; heard[] is the tick
+     * of a Reset, less than a second ago. */
+    uint8_t answered[PDCP_BIT_BYTES(PDCP_UNKNOWN_IDS)];
+    uint8_t told[PDCP_BIT_BYTES(PDCP_UNKNOWN_IDS)];
 } pdcp_unknown_t;
 
 /* All ids are quiet. */

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bits.h"
 #include "profile_match.h"
 #include "profile_type.h"
 
@@ -24,7 +25,7 @@ static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_ident
     uint8_t part = PDCP_NONE;
     profile_part_t *at = links->parts;
     for (uint8_t i = 0; i < PROFILE_PARTS_MAX; i++, at++) {
-        if (!profile_bit(used, i)) {
+        if (!pdcp_bit(used, i)) {
             part = i;
             unused = at;
         } else if (pdcp_identity_equal(&at->identity, owner)) {
@@ -33,7 +34,7 @@ static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_ident
     }
     if (unused != NULL) {
         unused->identity = *owner;
-        profile_set_bit(used, part, true);
+        pdcp_set_bit(used, part, true);
     }
     return part;
 }
@@ -64,15 +65,15 @@ static profile_entry_t *insert(profile_links_t *links, const profile_end_t *inpu
 
 bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool by_host)
 {
-    uint8_t used[(PROFILE_PARTS_MAX + 7) / 8]; /* but for the entry that goes */
+    uint8_t used[PDCP_BIT_BYTES(PROFILE_PARTS_MAX)]; /* but for the entry that goes */
     const uint8_t old = profile_links_find(links, &link->input.owner, link->input.index);
     const uint8_t stand_in = old != PDCP_NONE ? links->entries[old].stand_in : (uint8_t)PDCP_NONE;
     memset(used, 0, sizeof used);
     const profile_entry_t *at = links->entries;
     for (uint8_t i = 0; i < links->count; i++, at++) {
         if (i != old) {
-            profile_set_bit(used, at->output.part, true);
-            profile_set_bit(used, at->input.part, true);
+            pdcp_set_bit(used, at->output.part, true);
+            pdcp_set_bit(used, at->input.part, true);
         }
     }
     /* If only the second end finds no part, the first one got that of its device in the old entry, or one

@@ -84,18 +84,3 @@ uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input)
     return channel->link == PDCP_LINK_ACTIVE && profile_is_ready(nodes, input, PDCP_INPUT) ? channel->feed
                                                                                            : PDCP_NONE;
 }
-
-bool profile_bit(const uint8_t *bits, uint8_t number)
-{
-    return (bits[number / 8] & (1u << (number % 8))) != 0;
-}
-
-void profile_set_bit(uint8_t *bits, uint8_t number, bool value)
-{
-    const uint8_t mask = (uint8_t)(1u << (number % 8));
-    uint8_t *byte = &bits[number / 8];
-    *byte |= mask;
-    if (!value) {
-        *byte ^= mask;
-    }
-}

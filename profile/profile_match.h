@@ -36,8 +36,4 @@ bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transf
 /* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
 uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input);
 
-/* Sets of channels or places, a bit for each number. */
-bool profile_bit(const uint8_t *bits, uint8_t number);
-void profile_set_bit(uint8_t *bits, uint8_t number, bool value);
-
 #endif

@@ -77,7 +77,7 @@ bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
     }
     const pdcp_node_t *node = &scene->nodes->nodes[place];
     if (node->state == PDCP_NODE_LOST) {
-        return profile_bit(scene->awaited, place);
+        return pdcp_bit(scene->awaited, place);
     }
     return node->state == PDCP_NODE_SETUP && !node->setup_again;
 }
@@ -147,10 +147,10 @@ static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
         return;
     }
     if (old != PDCP_NONE && rival_of(plan, input, old) == PDCP_NONE) {
-        profile_set_bit(plan->taken, old, false);
+        pdcp_set_bit(plan->taken, old, false);
     }
     if (output != PDCP_NONE) {
-        profile_set_bit(plan->taken, output, true);
+        pdcp_set_bit(plan->taken, output, true);
     }
 }
 
@@ -165,7 +165,7 @@ static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
         }
     }
     const pdcp_channel_t *to = channel_of(plan, input);
-    if (profile_is_sole(to) && profile_bit(plan->taken, output)) {
+    if (profile_is_sole(to) && pdcp_bit(plan->taken, output)) {
         return false;
     }
     return channel_of(plan, output)->node != to->node;
@@ -324,7 +324,7 @@ static void descend(profile_plan_t *plan, uint8_t need)
     uint8_t *below = &plan->below[plan->depth / 2];
     *below = (uint8_t)((*below & ~(0xFu << shift)) | (unsigned)(top->source << 2 | top->need) << shift);
     plan->depth++;
-    profile_set_bit(plan->open, top->mark, true);
+    pdcp_set_bit(plan->open, top->mark, true);
     push(plan, need, SOURCE_ORIGINAL);
 }
 
@@ -340,8 +340,8 @@ static void ascend(profile_plan_t *plan)
     const unsigned kept = (unsigned)plan->below[plan->depth / 2] >> below_shift(plan);
     do {
         top->mark--;
-    } while (!profile_bit(plan->open, top->mark));
-    profile_set_bit(plan->open, top->mark, false);
+    } while (!pdcp_bit(plan->open, top->mark));
+    pdcp_set_bit(plan->open, top->mark, false);
     top->cursor = top->input;
     top->input = plan->log[top->mark];
     top->tried = plan->want[top->input];
@@ -358,7 +358,7 @@ static void undo_to(profile_plan_t *plan, uint8_t mark)
 
 static bool is_connected(const profile_plan_t *plan, uint8_t input)
 {
-    return plan->want[input] != PDCP_NONE && !(plan->finding && profile_bit(plan->of.bits.gone, input));
+    return plan->want[input] != PDCP_NONE && !(plan->finding && pdcp_bit(plan->of.bits.gone, input));
 }
 
 /* The next unconnected input, behind the last one (PDCP_NONE: the first one), that the link of an input
@@ -513,10 +513,10 @@ static void find_next(profile_plan_t *plan)
 {
     const uint8_t input = plan->input_at;
     if (is_lacking(plan, input)) {
-        profile_set_bit(plan->of.bits.gone, input, true);
+        pdcp_set_bit(plan->of.bits.gone, input, true);
         plan->changed = true;
         if (input == plan->input ||
-            (!profile_bit(plan->of.bits.lacking, input) && original_of(plan, input) != PDCP_NONE)) {
+            (!pdcp_bit(plan->of.bits.lacking, input) && original_of(plan, input) != PDCP_NONE)) {
             plan->spoilt = true;
         }
     }
@@ -835,7 +835,7 @@ static void autoconfigure(profile_plan_t *plan)
 static uint8_t working(const profile_scene_t *scene, uint8_t input)
 {
     const uint8_t feed = profile_feed(scene->nodes, input);
-    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || profile_bit(scene->made, input)) {
+    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
         return PDCP_NONE;
     }
     return feed;
@@ -922,7 +922,7 @@ static void enforce(profile_plan_t *plan)
     if (rival != PDCP_NONE) {
         const uint8_t last = profile_is_before(plan->nodes, rival, plan->at) ? plan->at : rival;
         set_source(plan, last, PDCP_NONE);
-        profile_set_bit(plan->of.bits.gone, last, true);
+        pdcp_set_bit(plan->of.bits.gone, last, true);
     } else if (was_last(plan, PDCP_CHANNELS_MAX)) {
         go_on(plan, PHASE_ENFORCE);
     }
@@ -932,7 +932,7 @@ static void remove_dropped(const profile_plan_t *plan)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t entry =
-            profile_bit(plan->of.bits.gone, i) ? profile_links_of(plan->links, plan->nodes, i) : PDCP_NONE;
+            pdcp_bit(plan->of.bits.gone, i) ? profile_links_of(plan->links, plan->nodes, i) : PDCP_NONE;
         if (entry != PDCP_NONE) {
             profile_links_remove(plan->links, entry);
         }
@@ -1012,8 +1012,8 @@ bool profile_plan_is_stale(profile_plan_t *plan, const profile_scene_t *scene)
     bool stale = false;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++, node++) {
         const bool ready = node->state == PDCP_NODE_READY;
-        if (ready != profile_bit(plan->ready, i)) {
-            profile_set_bit(plan->ready, i, ready);
+        if (ready != pdcp_bit(plan->ready, i)) {
+            pdcp_set_bit(plan->ready, i, ready);
             stale = true;
         }
     }

@@ -14,6 +14,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pdcp_bits.h"
 #include "pdcp_nodes.h"
 #include "profile_links.h"
 
@@ -42,8 +43,8 @@ enum {
 /* Channels looked at in one plan. What is not found within is not found. */
 #define PROFILE_PLAN_STEPS 200000uL
 
-#define PROFILE_CHANNEL_BYTES ((PDCP_CHANNELS_MAX + 7) / 8)
-#define PROFILE_PLACE_BYTES ((PDCP_DEVICES_MAX + 7) / 8)
+#define PROFILE_CHANNEL_BYTES PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)
+#define PROFILE_PLACE_BYTES PDCP_BIT_BYTES(PDCP_DEVICES_MAX)
 
 /* A link that a device has refused or not answered: not planned until the ban is lifted. */
 typedef struct {

@@ -197,10 +197,10 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
     const bool urgent = run->urgent;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
         if (run->scene.nodes->channels[i].node == node) {
-            profile_set_bit(run->dropping, i, false);
+            pdcp_set_bit(run->dropping, i, false);
         }
     }
-    profile_set_bit(run->scene.awaited, node, false);
+    pdcp_set_bit(run->scene.awaited, node, false);
     if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
         read_back(run, node);
     }
@@ -245,7 +245,7 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
     run->wishing = false;
     if (status == PDCP_OK) {
         run->tries = 0;
-        profile_set_bit(run->scene.made, run->wish.input, true);
+        pdcp_set_bit(run->scene.made, run->wish.input, true);
         run->moves++;
         return;
     }
@@ -277,7 +277,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
         (void)adopt_link(run, input, false);
     }
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
-        profile_set_bit(run->scene.made, input, profile_breaks_sole_access(nodes, channel->feed, input));
+        pdcp_set_bit(run->scene.made, input, profile_breaks_sole_access(nodes, channel->feed, input));
         make_due(run, run->at_events);
     }
 }
@@ -320,9 +320,9 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
     const uint8_t link = run->scene.nodes->channels[input].link;
     const uint8_t entry = entry_of(run, input);
-    const bool dropping = profile_bit(run->dropping, input);
+    const bool dropping = pdcp_bit(run->dropping, input);
     if (link == PDCP_LINK_NONE) {
-        profile_set_bit(run->dropping, input, false);
+        pdcp_set_bit(run->dropping, input, false);
     }
     if (dropping) {
         return;
@@ -350,7 +350,7 @@ void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t no
         break;
     case PDCP_EVENT_RESET:
         if (event->status == PDCP_OK) {
-            profile_set_bit(run->scene.awaited, event->node, true);
+            pdcp_set_bit(run->scene.awaited, event->node, true);
             run->awaited_ms = now_ms + PROFILE_RESET_MS;
         }
         break;
@@ -387,7 +387,7 @@ static void leave_unwanted(profile_run_t *run)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t feed = profile_feed(run->scene.nodes, i);
         if (feed != PDCP_NONE && feed != run->plan.want[i]) {
-            profile_set_bit(run->scene.made, i, true);
+            pdcp_set_bit(run->scene.made, i, true);
         }
     }
 }
@@ -425,7 +425,7 @@ static void forget_working(profile_run_t *run)
         const profile_entry_t *entry = &run->links.entries[e];
         const uint8_t input = profile_links_channel(&run->links, run->scene.nodes, &entry->input, PDCP_INPUT);
         if (entry->by_host && input != PDCP_NONE) {
-            profile_set_bit(run->scene.made, input, false);
+            pdcp_set_bit(run->scene.made, input, false);
         }
     }
 }
@@ -517,7 +517,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
         }
     }
     if (!original) {
-        profile_set_bit(run->dropping, input, true);
+        pdcp_set_bit(run->dropping, input, true);
         (void)pdcp_arb_disconnect(arb, input);
     }
 }
@@ -561,7 +561,7 @@ static bool is_lacking(const profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
     const uint8_t feed = profile_feed(nodes, input);
-    return feed != PDCP_NONE && !profile_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
+    return feed != PDCP_NONE && !pdcp_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
            (misses_something(nodes, feed) || misses_something(nodes, input));
 }
 

@@ -14,6 +14,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pdcp_bits.h"
 #include "profile_config.h"
 #include "profile_match.h"
 
@@ -90,7 +91,7 @@ profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *byte
 /* Whether a number is in a set, a bit for each. */
 static inline bool profile_tlv_has(const uint8_t set[PROFILE_TLV_SET_BYTES], uint8_t number)
 {
-    return profile_bit(set, number);
+    return pdcp_bit(set, number);
 }
 
 /* Does a link name this device? Now and then it is said of one that no link names: of one in eight when

@@ -41,8 +41,7 @@ uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
     const pdcp_identity_t identity = arb_host_get_identity(bytes);
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t place = pdcp_nodes_find(nodes, &identity);
-    const uint8_t state = place != PDCP_NONE ? nodes->nodes[place].state : (uint8_t)PDCP_NODE_LOST;
-    return state != PDCP_NODE_LOST && state != PDCP_NODE_ASKED ? place : (uint8_t)PDCP_NONE;
+    return pdcp_nodes_is_bound(nodes, place) ? place : (uint8_t)PDCP_NONE;
 }
 
 uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)

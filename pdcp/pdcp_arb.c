@@ -213,20 +213,12 @@ static bool is_reset_answer(const can_frame_t *frame)
     return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
 }
 
-/* Places in this state. */
-static uint8_t count_state(const pdcp_arb_t *arb, pdcp_node_state_t state)
-{
-    uint8_t places = 0;
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        places = (uint8_t)(places + (arb->bus.nodes.nodes[i].state == (uint8_t)state));
-    }
-    return places;
-}
-
 /* Has it granted an id to a device (D-BUS-42)? */
 static bool has_own(const pdcp_arb_t *arb)
 {
-    return count_state(arb, PDCP_NODE_FREE) + count_state(arb, PDCP_NODE_ASKED) != PDCP_DEVICES_MAX;
+    return pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_FREE) +
+               pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_ASKED) !=
+           PDCP_DEVICES_MAX;
 }
 
 static uint16_t own_hold_ms(const pdcp_arb_t *arb)
@@ -291,7 +283,7 @@ static void on_held(pdcp_arb_t *arb, uint8_t place)
     arb->held_ms = own_hold_ms(arb);
     drop_held(arb, place);
     bind(arb, &held.identity, held.asked_id);
-    if (count_state(arb, PDCP_NODE_SETUP) < PDCP_HOLD_SETUPS) {
+    if (pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_SETUP) < PDCP_HOLD_SETUPS) {
         return;
     }
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
@@ -959,21 +951,11 @@ void pdcp_arb_tx_pop(pdcp_arb_t *arb)
     count(arb, PDCP_STAT_TX);
 }
 
-/* Can the device be asked? */
-static bool is_bound(pdcp_arb_t *arb, uint8_t node)
-{
-    if (node >= PDCP_DEVICES_MAX) {
-        return false;
-    }
-    const uint8_t state = node_of(arb, node)->state;
-    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST && state != PDCP_NODE_ASKED;
-}
-
 static pdcp_status_t host_request(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param,
                                   uint8_t *bytes, uint16_t size, uint8_t code)
 {
     pdcp_host_request_t *host = &arb->host;
-    if (!is_bound(arb, node)) {
+    if (!pdcp_nodes_is_bound(&arb->bus.nodes, node)) {
         return PDCP_ERR_UNKNOWN;
     }
     if (host->active) {
@@ -1048,7 +1030,7 @@ bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
 {
     arb->bus.now_ms = now_ms;
-    if (!is_bound(arb, node)) {
+    if (!pdcp_nodes_is_bound(&arb->bus.nodes, node)) {
         return false;
     }
     node_of(arb, node)->reset_asked = true;

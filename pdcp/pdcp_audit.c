@@ -178,16 +178,6 @@ static bool is_asking(pdcp_bus_t *bus)
     return !pdcp_request_is_idle(bus, node) && pdcp_bus_node(bus, node)->request.client == PDCP_CLIENT_AUDIT;
 }
 
-static bool is_anybody_ready(const pdcp_bus_t *bus)
-{
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (bus->nodes.nodes[i].state == PDCP_NODE_READY) {
-            return true;
-        }
-    }
-    return false;
-}
-
 /* Without devices an arbitrator sleeps from beacon to beacon. */
 void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
 {
@@ -195,7 +185,7 @@ void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
     if (audit->window != 0 && --audit->window == 0) {
         memset(audit->found, 0, sizeof audit->found);
     }
-    audit->asleep = audit->window == 0 && !is_anybody_ready(bus);
+    audit->asleep = audit->window == 0 && pdcp_nodes_count_state(&bus->nodes, PDCP_NODE_READY) == 0;
     if (audit->asleep) {
         return;
     }

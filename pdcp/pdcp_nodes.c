@@ -59,6 +59,24 @@ void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *
     nodes->nodes[place].identity = *identity;
 }
 
+bool pdcp_nodes_is_bound(const pdcp_nodes_t *nodes, uint8_t node)
+{
+    if (node >= PDCP_DEVICES_MAX) {
+        return false;
+    }
+    const uint8_t state = nodes->nodes[node].state;
+    return state != PDCP_NODE_FREE && state != PDCP_NODE_LOST && state != PDCP_NODE_ASKED;
+}
+
+uint8_t pdcp_nodes_count_state(const pdcp_nodes_t *nodes, pdcp_node_state_t state)
+{
+    uint8_t places = 0;
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
+        places = (uint8_t)(places + (nodes->nodes[i].state == (uint8_t)state));
+    }
+    return places;
+}
+
 static void drop_needs(pdcp_nodes_t *nodes, pdcp_node_t *gone)
 {
     const uint16_t size = (uint16_t)(2u * gone->needs_stride * gone->channel_count);

@@ -113,6 +113,12 @@ void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *i
 /* Takes a free place for a device whose bind request is held. */
 void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity);
 
+/* Is there a device at this place that can be asked: bound, and not lost? node: any number. */
+bool pdcp_nodes_is_bound(const pdcp_nodes_t *nodes, uint8_t node);
+
+/* How many places are in this state. */
+uint8_t pdcp_nodes_count_state(const pdcp_nodes_t *nodes, pdcp_node_state_t state);
+
 /* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
  * nothing. */
 void pdcp_nodes_remove(pdcp_nodes_t *nodes, uint8_t node);

@@ -72,16 +72,14 @@ void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t node)
 /* Tells a device Release if it is to be told and can be. False: it is to be told later. */
 static bool release(pdcp_bus_t *bus, uint8_t node)
 {
-    const uint8_t state = bus->nodes.nodes[node].state;
-    if (!pdcp_bit(bus->suspend.release, node) || state == PDCP_NODE_LOST) {
+    if (!pdcp_bit(bus->suspend.release, node) || bus->nodes.nodes[node].state == PDCP_NODE_LOST) {
         return true; /* one that is lost is told when it is back */
     }
     if (!pdcp_request_is_idle(bus, node) || bus->txq.count > PDCP_TX_MAX / 2) {
         return false;
     }
     pdcp_set_bit(bus->suspend.release, node, false);
-    if (bus->suspend.left[node] == 0 &&
-        (state == PDCP_NODE_SETUP || state == PDCP_NODE_READY || state == PDCP_NODE_FAILED)) {
+    if (bus->suspend.left[node] == 0 && pdcp_nodes_is_bound(&bus->nodes, node)) {
         pdcp_request_command(bus, node, PDCP_CLIENT_AUDIT, PDCP_RELEASE, 0);
     }
     return true;

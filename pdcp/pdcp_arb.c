@@ -342,6 +342,13 @@ static void discard_queue(pdcp_arb_t *arb)
     pdcp_txq_init(&arb->bus.txq);
 }
 
+/* Waits for the next beacon of the other arbitrator (D-BUS-35). */
+static void stand_by(pdcp_arb_t *arb)
+{
+    pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
+                  (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
+}
+
 /* D-BUS-42: this arbitrator goes on standby; the host, if it waits, is told. */
 static void go_silent(pdcp_arb_t *arb)
 {
@@ -351,8 +358,7 @@ static void go_silent(pdcp_arb_t *arb)
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
     forget_bus(arb);
-    pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
-                  (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
+    stand_by(arb);
     pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
 }
 
@@ -383,8 +389,7 @@ static void on_foreign_beacon(pdcp_arb_t *arb)
     count(arb, PDCP_STAT_FOREIGN_BEACON);
     const bool is_first = pdcp_standby_on_beacon(&arb->standby, arb->bus.now_ms);
     if (arb->silent) {
-        pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON,
-                      (uint16_t)(PDCP_STANDBY_MS + arb->serial % PDCP_STANDBY_SPREAD_MS));
+        stand_by(arb);
         return;
     }
     if (is_first) {

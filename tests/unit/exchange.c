@@ -235,9 +235,9 @@ void exchange_add_output(exchange_t *x, const char *out_id)
     exchange_rx(x, "011#0A");
 }
 
-void exchange_add_input(exchange_t *x)
+void exchange_set_up_input(exchange_t *x, const char *vid_pid, const char *serial, const char *type)
 {
-    static const exchange_pair_t pairs[] = {
+    const exchange_pair_t pairs[] = {
         {"312#81 12 0200 0200 0600", NULL},
         {"312#03 01 00", "212#83 01 01 00 0200 0200"},
         {"312#03 02 00", "212#83 01 02 00 0600"},
@@ -248,9 +248,9 @@ void exchange_add_input(exchange_t *x)
         {"312#04 04 01 00", "212#84 01 04 01 00"},
         {"312#03 03 01", "212#83 01 03 01 01"},
         {"312#03 01 01", "212#83 01 01 01 0053 1011"},
-        {"312#03 05 01", "212#83 01 05 01 FFFF FFFF"},
-        {"312#03 06 01", "212#83 01 06 01 FFFF FF"},
-        {"312#03 08 01", "212#83 01 08 01 0000 0000"},
+        {"312#03 05 01", vid_pid},
+        {"312#03 06 01", serial},
+        {"312#03 08 01", type},
         {"312#03 09 01", "212#83 00 09 01"},
         {"312#03 0A 01", "212#83 00 0A 01"},
         {"312#03 0B 01", "212#83 01 0B 01 1011"},
@@ -258,7 +258,21 @@ void exchange_add_input(exchange_t *x)
     };
     exchange_rx(x, "612#01 0200 0200 0600");
     exchange_pairs(x, pairs);
+}
+
+void exchange_add_input(exchange_t *x)
+{
+    exchange_set_up_input(x, "212#83 01 05 01 FFFF FFFF", "212#83 01 06 01 FFFF FF",
+                          "212#83 01 08 01 0000 0000");
     exchange_rx(x, "012#0A");
+}
+
+void exchange_start_limb(exchange_t *x)
+{
+    exchange_start(x, 0xFFFFFF00u);
+    exchange_add_output(x, "FE");
+    exchange_add_input(x);
+    exchange_clear(x);
 }
 
 void exchange_check_fails(exchange_t *x, const char *node_id)

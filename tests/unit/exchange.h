@@ -82,9 +82,18 @@ void exchange_run(exchange_t *x, const exchange_pair_t *pairs);
 void exchange_add_output(exchange_t *x, const char *out_id);
 void exchange_add_input(exchange_t *x);
 
+/* Binds and sets up the device of that input, which answers 5, 6 and 8 with these texts; no beacon. */
+void exchange_set_up_input(exchange_t *x, const char *vid_pid, const char *serial, const char *type);
+
+/* Starts with both devices, the output with node id FEh, shortly before the time runs over. */
+void exchange_start_limb(exchange_t *x);
+
 /* The link of that output to that input being made (pdcp-bus.md 8): 5, 6, 8, 7 and enabled to the input, then
  * enabled to the output. */
 extern const exchange_pair_t exchange_making[];
+
+/* Makes that link, without a host. */
+void exchange_make_link(exchange_t *x);
 
 /* The device with this node id (two hexadecimal digits) is asked who it is, in vain: the check of its
  * identity (D-BUS-41). */

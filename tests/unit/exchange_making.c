@@ -2,6 +2,7 @@
 #include <stddef.h>
 
 #include "exchange.h"
+#include "unity.h"
 
 const exchange_pair_t exchange_making[] = {
     {"312#04 05 01 0200 0200", "212#84 01 05 01"},
@@ -12,3 +13,12 @@ const exchange_pair_t exchange_making[] = {
     {"311#04 04 01 01", "211#84 01 04 01"},
     {NULL, NULL},
 };
+
+void exchange_make_link(exchange_t *x)
+{
+    const pdcp_nodes_t *nodes = &x->arb->bus.nodes;
+    TEST_ASSERT_EQUAL(
+        PDCP_OK, pdcp_arb_connect(x->arb, pdcp_nodes_channel(nodes, 0, 1), pdcp_nodes_channel(nodes, 1, 1)));
+    exchange_run(x, exchange_making);
+    exchange_clear(x);
+}

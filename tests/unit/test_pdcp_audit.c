@@ -10,10 +10,7 @@ static exchange_t x;
 /* Device 0002:0002:0004 id 11h, output 1 with id FEh; device 0002:0002:0006 id 12h, input 1. */
 void setUp(void)
 {
-    exchange_start(&x, 0xFFFFFF00u);
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    exchange_clear(&x);
+    exchange_start_limb(&x);
 }
 
 void tearDown(void) {}
@@ -33,16 +30,9 @@ static const pdcp_channel_t *the_input(void)
     return &x.arb->bus.nodes.channels[input()];
 }
 
-static void make_link(void)
-{
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    exchange_run(&x, exchange_making);
-    exchange_clear(&x);
-}
-
 static void begin(bool planned)
 {
-    make_link();
+    exchange_make_link(&x);
     if (planned) {
         pdcp_arb_plan_links(x.arb, false);
     }
@@ -166,7 +156,7 @@ static void test_an_input_that_refused_to_be_disabled(void)
         {"312#04 07 01 0000", "212#84 01 07 01"},
         {NULL, NULL},
     };
-    make_link();
+    exchange_make_link(&x);
     TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
     exchange_run(&x, refusing);
     TEST_ASSERT_TRUE(the_input()->enabled);
@@ -312,7 +302,7 @@ static void test_an_output_that_is_not_kept(void)
         {"312#04 07 01 0000", "212#84 01 07 01"}, {"313#04 04 01 00", "213#84 01 04 01"},
         {"313#04 07 01 0000", "213#84 01 07 01"}, {NULL, NULL},
     };
-    make_link();
+    exchange_make_link(&x);
     link_second_input();
     pdcp_arb_audit(x.arb, x.now_ms);
     for (int turn = 0; turn < 4; turn++) {

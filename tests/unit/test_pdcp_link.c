@@ -7,10 +7,7 @@ static exchange_t x;
 /* Device 0002:0002:0004 id 11h, output 1 with id FEh; device 0002:0002:0006 id 12h, input 1. */
 void setUp(void)
 {
-    exchange_start(&x, 0xFFFFFF00u);
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    exchange_clear(&x);
+    exchange_start_limb(&x);
 }
 
 void tearDown(void) {}

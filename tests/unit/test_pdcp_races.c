@@ -8,10 +8,7 @@ static exchange_t x;
 
 void setUp(void)
 {
-    exchange_start(&x, 0xFFFFFF00u);
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    exchange_clear(&x);
+    exchange_start_limb(&x);
 }
 
 void tearDown(void) {}

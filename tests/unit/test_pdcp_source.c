@@ -8,10 +8,7 @@ static exchange_t x;
 /* Device 0002:0002:0004 id 11h, output 1 with id FEh; device 0002:0002:0006 id 12h, input 1. */
 void setUp(void)
 {
-    exchange_start(&x, 0xFFFFFF00u);
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    exchange_clear(&x);
+    exchange_start_limb(&x);
 }
 
 void tearDown(void) {}
@@ -24,13 +21,6 @@ static uint8_t input(void)
 static const pdcp_channel_t *the_input(void)
 {
     return &x.arb->bus.nodes.channels[input()];
-}
-
-static void make_link(void)
-{
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1), input()));
-    exchange_run(&x, exchange_making);
-    exchange_clear(&x);
 }
 
 /* The source is lost: the link is inactive, the input silenced; 5, 6 and 8 stay. */
@@ -81,7 +71,7 @@ static void expect_table(pdcp_link_status_t link, uint16_t sn, uint8_t index)
  */
 static void test_a_device_that_names_another_source_is_told_its_own(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
     exchange_pairs(&x, writing);
     exchange_tx(&x, "312#8F 01 01");
@@ -91,7 +81,7 @@ static void test_a_device_that_names_another_source_is_told_its_own(void)
 
 static void test_another_channel_of_its_source_is_another_source(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 02");
     exchange_pairs(&x, writing);
     exchange_tx(&x, "312#8F 01 01");
@@ -101,7 +91,7 @@ static void test_another_channel_of_its_source_is_another_source(void)
 
 static void test_a_device_that_names_its_source_is_told_nothing(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01");
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
@@ -118,7 +108,7 @@ static void test_an_inactive_link_is_named_and_not_made(void)
         {"312#8F 00 01", NULL},
         {NULL, NULL},
     };
-    make_link();
+    exchange_make_link(&x);
     lose_source();
     update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 01");
     exchange_run(&x, naming);
@@ -146,7 +136,7 @@ static void test_an_input_without_a_link_names_none(void)
 /* What a device refuses to tell does not differ. */
 static void test_a_device_that_refuses_to_name_its_source_is_answered(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 00 05 01", "212#83 00 06 01");
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
@@ -155,7 +145,7 @@ static void test_a_device_that_refuses_to_name_its_source_is_answered(void)
 
 static void test_half_an_answer_is_enough(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 00 05 01", "212#83 01 06 01 0900 01");
     exchange_pairs(&x, writing);
     exchange_tx(&x, "312#8F 01 01");
@@ -165,7 +155,7 @@ static void test_half_an_answer_is_enough(void)
 /* D-BUS-19: it asks again. */
 static void test_a_silent_device_is_not_answered(void)
 {
-    make_link();
+    exchange_make_link(&x);
     pdcp_arb_plan_links(x.arb, true);
     exchange_rx(&x, "212#0F 01");
     for (int i = 0; i < 3; i++) {
@@ -179,7 +169,7 @@ static void test_a_silent_device_is_not_answered(void)
 /* Every write may be refused: the others are made all the same. */
 static void test_what_is_refused_is_left_out(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
     for (const exchange_pair_t *pair = writing; pair->tx != NULL; pair++) {
         char refusal[16] = "";
@@ -198,7 +188,7 @@ static void test_what_is_refused_is_left_out(void)
 /* An input that does not answer is not asked more; its output is written all the same. */
 static void test_a_silent_input_does_not_hold_up_its_output(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
     for (int i = 0; i < 3; i++) {
         exchange_tx(&x, "312#04 05 01 0200 0200");
@@ -216,7 +206,7 @@ static void test_a_silent_input_does_not_hold_up_its_output(void)
 /* The source is lost in the middle: it is not waited for, and the input is silenced. */
 static void test_a_source_lost_in_the_middle(void)
 {
-    make_link();
+    exchange_make_link(&x);
     exchange_pass(&x, 1000);
     exchange_rx(&x, "012#0A");
     exchange_pass(&x, 499);
@@ -243,7 +233,7 @@ static void test_a_source_lost_in_the_middle(void)
 /* The input's own device is lost in the middle: it answers a Reset. Its output has nobody to listen. */
 static void test_an_input_lost_in_the_middle(void)
 {
-    make_link();
+    exchange_make_link(&x);
     update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
     for (int i = 0; i < 5; i++) {
         exchange_tx(&x, writing[i].tx);
@@ -262,33 +252,7 @@ static void test_an_input_lost_in_the_middle(void)
     TEST_ASSERT_EQUAL(4, the_input()->source.sn);
 }
 
-/* A device that was away comes back with another source in mind: that of its remembered link is written, also
- * while the source of that is away. */
-static void come_back(const char *vid_pid, const char *serial, const char *type)
-{
-    const exchange_pair_t pairs[] = {
-        {"312#81 12 0200 0200 0600", NULL},
-        {"312#03 01 00", "212#83 01 01 00 0200 0200"},
-        {"312#03 02 00", "212#83 01 02 00 0600"},
-        {"312#03 06 00", "212#83 00 06 00"},
-        {"312#03 0B 00", "212#83 01 0B 00 6400"},
-        {"312#03 0A 00", "212#83 01 0A 00 F401"},
-        {"312#03 09 00", "212#83 01 09 00 01"},
-        {"312#04 04 01 00", "212#84 01 04 01 00"},
-        {"312#03 03 01", "212#83 01 03 01 01"},
-        {"312#03 01 01", "212#83 01 01 01 0053 1011"},
-        {"312#03 05 01", vid_pid},
-        {"312#03 06 01", serial},
-        {"312#03 08 01", type},
-        {"312#03 09 01", "212#83 00 09 01"},
-        {"312#03 0A 01", "212#83 00 0A 01"},
-        {"312#03 0B 01", "212#83 01 0B 01 1011"},
-        {NULL, NULL},
-    };
-    exchange_rx(&x, "612#01 0200 0200 0600");
-    exchange_pairs(&x, pairs);
-}
-
+/* The source of the remembered link. */
 static const exchange_pair_t naming[] = {
     {"312#04 05 01 0200 0200", "212#84 01 05 01"},
     {"312#04 06 01 0400 01", "212#84 01 06 01"},
@@ -296,12 +260,15 @@ static const exchange_pair_t naming[] = {
     {NULL, NULL},
 };
 
+/* A device that was away comes back with another source in mind: that of its remembered link is written, also
+ * while the source of that is away. */
 static void test_a_setup_that_finds_another_source(void)
 {
-    make_link();
+    exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    come_back("212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03", "212#83 01 08 01 0050 2021");
+    exchange_set_up_input(&x, "212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03",
+                          "212#83 01 08 01 0050 2021");
     exchange_run(&x, naming);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
     TEST_ASSERT_EQUAL(4, the_input()->source.sn);
@@ -310,42 +277,45 @@ static void test_a_setup_that_finds_another_source(void)
 /* 8 may be all that is wrong. */
 static void test_a_setup_that_finds_another_type(void)
 {
-    make_link();
+    exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    come_back("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01", "212#83 01 08 01 0050 2022");
+    exchange_set_up_input(&x, "212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01",
+                          "212#83 01 08 01 0050 2022");
     exchange_run(&x, naming);
 }
 
 static void test_a_setup_that_finds_its_source(void)
 {
-    make_link();
+    exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    come_back("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01", "212#83 01 08 01 0050 2021");
+    exchange_set_up_input(&x, "212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01",
+                          "212#83 01 08 01 0050 2021");
     exchange_silence(&x);
 }
 
 /* A device that names no source because it cannot is not told one. */
 static void test_a_setup_that_is_refused_a_source(void)
 {
-    make_link();
+    exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    come_back("212#83 00 05 01", "212#83 00 06 01", "212#83 00 08 01");
+    exchange_set_up_input(&x, "212#83 00 05 01", "212#83 00 06 01", "212#83 00 08 01");
     exchange_silence(&x);
 }
 
 /* A link that is made afterwards writes the same. */
 static void test_a_link_that_is_made_is_not_written_once_more(void)
 {
-    make_link();
+    exchange_make_link(&x);
     exchange_pass(&x, 1000);
     exchange_rx(&x, "011#0A");
     exchange_pass(&x, 500);
     exchange_tx(&x, "311#04 04 01 00"); /* nobody listens */
     exchange_rx(&x, "211#84 01 04 01");
-    come_back("212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03", "212#83 01 08 01 0050 2021");
+    exchange_set_up_input(&x, "212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03",
+                          "212#83 01 08 01 0050 2021");
     exchange_run(&x, exchange_making);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
 }

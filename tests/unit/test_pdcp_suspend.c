@@ -8,10 +8,7 @@ static exchange_t x;
 /* Devices 0002:0002:0004 id 11h and 0002:0002:0006 id 12h. */
 void setUp(void)
 {
-    exchange_start(&x, 0xFFFFFF00u);
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    exchange_clear(&x);
+    exchange_start_limb(&x);
 }
 
 void tearDown(void) {}

@@ -60,6 +60,7 @@ typedef struct {
     uint16_t mask;     /* 2416h */
     bool wrong_size;   /* must fail with 01h */
     bool last_piece;   /* 240Dh: with it the string is complete */
+    bool may_be_lost;  /* stands right behind garbage, which may have taken its first bytes as its own end */
     uint32_t end_byte; /* of all that was ever sent: it is out when so many are taken */
 } life_request_t;
 
@@ -67,7 +68,8 @@ typedef struct {
     life_random_t random;
     uint8_t out[LIFE_BYTES_MAX]; /* not taken by the arbitrator yet */
     uint32_t out_len;
-    uint32_t put_bytes; /* ever */
+    uint32_t put_bytes;   /* ever */
+    uint32_t garbage_end; /* what put_bytes was behind the last garbage */
     uint32_t taken_bytes;
     uint8_t in[LIFE_BYTES_MAX]; /* not understood yet */
     uint32_t in_len;

@@ -25,6 +25,7 @@ void life_host_init(life_host_t *host, uint32_t seed)
     host->random.state = seed * 2654435761u | 1u;
     host->is_open = true;
     host->reads = true;
+    host->garbage_end = UINT32_MAX;
     host->babbled_ms = 0u - HELD_MAX * (uint32_t)ANSWER_MS;
 }
 
@@ -410,6 +411,7 @@ void life_host_ask(life_host_t *host, const limb_t *limb)
     }
     request->mask = request->len == 2 ? arb_host_get_u16(payload) : payload[0];
     request->reference = next_reference(host);
+    request->may_be_lost = host->garbage_end == host->put_bytes;
     const uint16_t total = arb_host_finish(bytes, request->id, request->reference, request->len);
     put_bytes(host, bytes, total);
     request->end_byte = host->put_bytes;
@@ -433,6 +435,7 @@ void life_host_babble(life_host_t *host, const limb_t *limb, uint32_t now_ms)
             bytes[len - 1] = ARB_HOST_SYNC1;
         }
         put_bytes(host, bytes, len);
+        host->garbage_end = host->put_bytes;
         return;
     }
     /* Without checksums it may be completed by what follows, and is then carried out: nothing that matters is
@@ -447,6 +450,7 @@ void life_host_babble(life_host_t *host, const limb_t *limb, uint32_t now_ms)
         arb_host_finish(bytes, is_long ? ARB_MSG_SET_PARAMETER : ARB_MSG_GET_PARAMETER, 0, len);
     const uint32_t least = is_long ? ARB_HOST_HEADER + 8 : 1;
     put_bytes(host, bytes, least + chance(host, total - least));
+    host->garbage_end = host->put_bytes;
 }
 
 /* --- Opening and closing --- */
@@ -588,6 +592,24 @@ static void take_open(life_host_t *host, int k)
     memmove(&host->open[k], &host->open[k + 1], (size_t)(host->open_count - k) * sizeof host->open[0]);
 }
 
+/* A truncated message takes the first byte behind it as its own if that makes its checksum right, one time in
+ * 256: the request that begins there is never answered. Drops such requests among the first k; returns how
+ * many. */
+static int take_lost(life_host_t *host, int k)
+{
+    int lost = 0;
+    for (int i = k - 1; i >= 0; i--) {
+        if (host->open[i].may_be_lost) {
+            if (host->open[i].id == ARB_MSG_WRITE_CONFIGS) {
+                host->string_at = host->string_len; /* begins anew */
+            }
+            take_open(host, i);
+            lost++;
+        }
+    }
+    return lost;
+}
+
 /* Kinds that are wanted, or may be by a request that is not answered yet. */
 static uint16_t wanted_mask(const life_host_t *host)
 {
@@ -625,6 +647,9 @@ static void on_message(life_host_t *host, uint32_t now_ms, uint16_t id, uint8_t 
     }
     const life_request_t request = host->open[k];
     const bool overtakes = may_overtake(host, k, payload, len, now_ms);
+    if (!overtakes) {
+        k -= take_lost(host, k);
+    }
     if (k != 0 && !overtakes) {
         fail(&request, id, "out of order");
     }

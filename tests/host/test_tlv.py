@@ -257,9 +257,10 @@ int accepts(const uint8_t *bytes, uint16_t len)
     return profile_tlv_read(&reader, bytes, len) == PROFILE_TLV_DONE;
 }
 """)
-    parts = [source, *ROOT.glob("profile/*.c"), *ROOT.glob("pdcp/*.c")]
+    rooms = [ROOT / room for room in ("profile", "pdcp/common", "pdcp/arbitrator")]
+    parts = [source, *(part for room in rooms for part in room.glob("*.c"))]
     library = folder / "accepts.so"
-    includes = [f"-I{ROOT / 'profile'}", f"-I{ROOT / 'pdcp'}"]
+    includes = [f"-I{room}" for room in rooms]
     subprocess.run(["cc", "-std=c99", "-shared", "-fPIC", *includes, *parts, "-o", library], check=True)
     return ctypes.CDLL(str(library))
 

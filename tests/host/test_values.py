@@ -226,13 +226,13 @@ def enumerators(header: str, prefix: str, last: str) -> list[str]:
 
 
 def test_bus_counters_are_those_of_the_header() -> None:
-    """The names, in the order of pdcp/pdcp_stats.h."""
-    assert [name for name, _ in counters.BUS.counters] == enumerators("pdcp/pdcp_stats.h", "PDCP_STAT_", "COUNT")
+    """The names, in the order of pdcp/arbitrator/pdcp_stats.h."""
+    assert [name for name, _ in counters.BUS.counters] == enumerators("pdcp/arbitrator/pdcp_stats.h", "PDCP_STAT_", "COUNT")
 
 
 def test_storage_counters_are_those_of_the_header() -> None:
-    """Those of the configurations, behind four others, in the order of firmware/arb_config.h."""
-    names = enumerators("firmware/arb_config.h", "ARB_CONFIG_", "COUNTERS")
+    """Those of the configurations, behind four others, in the order of firmware/store/arb_config.h."""
+    names = enumerators("firmware/store/arb_config.h", "ARB_CONFIG_", "COUNTERS")
     ours = [name.removeprefix("configuration_") for name, _ in counters.STORAGE.counters[4:]]
     assert ours == [name.removeprefix("count_") for name in names]
 

@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the rules of the house that a compiler does not: who may include whom, names that the portable folders may
-not use, and the length of functions.
+"""Checks the rules of the house that a compiler does not: who may include whom, circles of files, names that the
+portable folders may not use, and the length of functions and files.
 
 Each violation is one line `file:line: message` on standard output. Exit status: 0 none, 1 some, 2 nothing to check.
 """
@@ -14,22 +14,35 @@ from pathlib import Path
 
 ALL_FOLDERS = ("pdcp", "profile", "firmware", "hal", "host_sim", "tests", "tools")
 
-# Folder -> the folders whose headers it may include besides its own.
+BUS = ("pdcp/common", "pdcp/arbitrator")
+FIRMWARE = ("firmware", "firmware/host", "firmware/store")
+
+# Room -> the rooms whose headers it may include besides its own. A file lies in the deepest room above it.
 MAY_INCLUDE: dict[str, tuple[str, ...]] = {
     "pdcp": (),
-    "profile": ("pdcp",),
-    "firmware": ("profile", "pdcp"),
+    "pdcp/common": (),
+    "pdcp/arbitrator": ("pdcp/common",),
+    "pdcp/device": ("pdcp/common",),
+    "profile": BUS,
+    "firmware": ("firmware/host", "firmware/store", "profile", *BUS),
+    "firmware/host": ("firmware", "firmware/store", "profile", *BUS),
+    "firmware/store": ("profile", *BUS),
+    "firmware/dspic33": (*FIRMWARE, "profile", *BUS, "pdcp/device", "hal"),
     "hal": (),
-    "host_sim": ("pdcp", "profile", "firmware", "hal"),
+    "host_sim": (*FIRMWARE, "profile", *BUS, "pdcp/device", "hal"),
     "tests": ALL_FOLDERS,
     "tools": ALL_FOLDERS,
 }
-# The one header of pdcp/ that hal/ may include.
-FRAME_HEADER = "can_frame.h"
+# Single headers that a room may include as well.
+MAY_INCLUDE_HEADERS: dict[str, tuple[str, ...]] = {
+    "hal": ("pdcp/common/can_frame.h",),
+    "firmware/store": ("firmware/arb_error.h", "firmware/arb_limits.h", "firmware/arb_port.h"),
+}
 
 PORTABLE = ("pdcp", "profile", "firmware")
 LENGTH_CHECKED = (*PORTABLE, "hal", "host_sim")
 MAX_FUNCTION_LINES = 60
+MAX_FILE_LINES = {"pdcp": 500, "profile": 500, "firmware": 500, "hal": 600, "host_sim": 600}
 
 # Headers of a microcontroller's compiler; tests/fakes has stand-ins of the same name for tests on a PC.
 VENDOR_HEADERS = frozenset(("xc.h",))
@@ -63,6 +76,14 @@ IDENTIFIER = re.compile(r"\b[A-Za-z_]\w*\b")
 FUNCTION_NAME = re.compile(r"\b([A-Za-z_]\w*)\s*\(")
 
 
+def room_of(path: Path) -> str:
+    """The deepest room that the file lies in."""
+    for parent in path.parents:
+        if parent.as_posix() in MAY_INCLUDE:
+            return parent.as_posix()
+    return path.parts[0]
+
+
 @dataclass(frozen=True)
 class Source:
     """One C file: its path from the root, its text, and its text without comments and literals."""
@@ -76,13 +97,13 @@ class Source:
         return self.path.parts[0]
 
     @property
-    def is_portable(self) -> bool:
-        return self.folder in PORTABLE and not self.is_firmware_main
+    def room(self) -> str:
+        return room_of(self.path)
 
     @property
-    def is_firmware_main(self) -> bool:
-        """A main of firmware/ joins a target's HAL to the application, or to the device role."""
-        return self.folder == "firmware" and self.path.name.startswith(("main_", "node_"))
+    def is_portable(self) -> bool:
+        """The mains in firmware/dspic33 join a target's HAL to the application, or to the device role."""
+        return self.folder in PORTABLE and self.room != "firmware/dspic33"
 
 
 @dataclass(frozen=True)
@@ -119,15 +140,13 @@ def read_sources(root: Path) -> list[Source]:
 
 
 def may_include(source: Source, header: Path) -> bool:
-    folder, target = source.folder, header.parts[0]
-    if folder == "hal" and target == "hal":
+    room, target = source.room, room_of(header)
+    if room == "hal" and target == "hal":
         # One target's files never see another target's.
         return header.parts[1] in ("include", source.path.parts[1])
-    if folder == "hal" and target == "pdcp":
-        return header.name == FRAME_HEADER
-    if source.is_firmware_main and target == "hal":
+    if header.as_posix() in MAY_INCLUDE_HEADERS.get(room, ()):
         return True
-    return target == folder or target in MAY_INCLUDE[folder]
+    return target == room or target in MAY_INCLUDE[room] or header.parts[0] in MAY_INCLUDE[room]
 
 
 def find_headers(source: Source, name: str, headers: list[Path]) -> list[Path]:
@@ -138,15 +157,19 @@ def find_headers(source: Source, name: str, headers: list[Path]) -> list[Path]:
     return beside or found
 
 
-def check_includes(source: Source, headers: list[Path]) -> Iterator[Violation]:
+def includes_of(source: Source, headers: list[Path]) -> Iterator[tuple[str, int, list[Path]]]:
+    """Name and line of every include, and the headers of the tree that it may mean."""
     code = strip_comments(source.text)
     for match in INCLUDE.finditer(code):
-        name, line = match["name"], line_of(code, match.start("name"))
+        yield match["name"], line_of(code, match.start("name")), find_headers(source, match["name"], headers)
+
+
+def check_includes(source: Source, headers: list[Path]) -> Iterator[Violation]:
+    for name, line, found in includes_of(source, headers):
         if name in VENDOR_HEADERS and not source.is_portable:
             continue
-        found = find_headers(source, name, headers)
         if found and not any(may_include(source, header) for header in found):
-            yield Violation(source.path, line, f"{source.folder}/ may not include {found[0].as_posix()}")
+            yield Violation(source.path, line, f"{source.room}/ may not include {found[0].as_posix()}")
         elif not found and source.is_portable and name not in PORTABLE_LIBRARY:
             yield Violation(source.path, line, f"{source.folder}/ may not include {name}, it is portable")
 
@@ -192,6 +215,41 @@ def check_lengths(source: Source) -> Iterator[Violation]:
             yield Violation(source.path, first, message)
 
 
+def check_size(source: Source) -> Iterator[Violation]:
+    lines, limit = source.text.count("\n"), MAX_FILE_LINES.get(source.folder)
+    if limit is not None and lines > limit:
+        yield Violation(source.path, limit + 1, f"the file has {lines} lines, more than {limit}")
+
+
+def check_circles(sources: list[Source], headers: list[Path]) -> Iterator[Violation]:
+    """A source and its header are one unit; no unit includes, through whatever others, itself."""
+    below: dict[Path, dict[Path, Violation]] = {}  # unit -> the units that it includes, and where
+    for source in sources:
+        if source.folder not in LENGTH_CHECKED:
+            continue
+        unit = source.path.with_suffix("")
+        for _, line, found in includes_of(source, headers):
+            for other in (header.with_suffix("") for header in found if may_include(source, header)):
+                if other != unit:
+                    place = Violation(source.path, line, f"{other.name}.h includes {unit.name}.h in turn: a circle")
+                    below.setdefault(unit, {}).setdefault(other, place)
+    for unit, others in sorted(below.items()):
+        for other, place in others.items():
+            if unit in reachable(below, other):
+                yield place
+
+
+def reachable(below: dict[Path, dict[Path, Violation]], start: Path) -> set[Path]:
+    seen: set[Path] = set()
+    waiting = [start]
+    while waiting:
+        for other in below.get(waiting.pop(), {}):
+            if other not in seen:
+                seen.add(other)
+                waiting.append(other)
+    return seen
+
+
 def check_tree(root: Path) -> tuple[int, list[Violation]]:
     """The number of files checked and what was found in them."""
     sources = read_sources(root)
@@ -201,11 +259,13 @@ def check_tree(root: Path) -> tuple[int, list[Violation]]:
         violations.extend(check_includes(source, headers))
         violations.extend(check_names(source))
         violations.extend(check_lengths(source))
+        violations.extend(check_size(source))
+    violations.extend(check_circles(sources, headers))
     return len(sources), violations
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(description="check includes, banned names and function lengths")
+    parser = argparse.ArgumentParser(description="check includes, circles, banned names and lengths")
     parser.add_argument("root", type=Path, nargs="?", default=Path(__file__).resolve().parent.parent)
     root: Path = parser.parse_args().root
     count, violations = check_tree(root)

@@ -227,7 +227,8 @@ def enumerators(header: str, prefix: str, last: str) -> list[str]:
 
 def test_bus_counters_are_those_of_the_header() -> None:
     """The names, in the order of pdcp/arbitrator/pdcp_stats.h."""
-    assert [name for name, _ in counters.BUS.counters] == enumerators("pdcp/arbitrator/pdcp_stats.h", "PDCP_STAT_", "COUNT")
+    names = enumerators("pdcp/arbitrator/pdcp_stats.h", "PDCP_STAT_", "COUNT")
+    assert [name for name, _ in counters.BUS.counters] == names
 
 
 def test_storage_counters_are_those_of_the_header() -> None:

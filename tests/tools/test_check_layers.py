@@ -9,13 +9,18 @@ import pytest
 SCRIPT = Path(__file__).resolve().parents[2] / "tools" / "check_layers.py"
 
 CLEAN_TREE = {
-    "pdcp/can_frame.h": "#include <stdint.h>\ntypedef struct { uint16_t id; } can_frame_t;\n",
-    "pdcp/pdcp_codec.h": '#include "can_frame.h"\n',
-    "pdcp/pdcp_codec.c": '#include "pdcp_codec.h"\n/* malloc( */\nconst char *s = "printf(";\n// free(\n',
+    "pdcp/common/can_frame.h": "#include <stdint.h>\ntypedef struct { uint16_t id; } can_frame_t;\n",
+    "pdcp/common/pdcp_codec.h": '#include "can_frame.h"\n',
+    "pdcp/common/pdcp_codec.c": '#include "pdcp_codec.h"\n/* malloc( */\nconst char *s = "printf(";\n// free(\n',
     "profile/profile_type.c": '#include "pdcp_codec.h"\n',
     "firmware/arb_app.c": '#include "pdcp_codec.h"\n#include <string.h>\n',
-    "firmware/main_dspic33.c": '#include <xc.h>\n#include "hal_can.h"\nint main(void)\n{\n    return 0;\n}\n',
-    "firmware/node_dspic33.c": '#include <xc.h>\n#include "hal_can.h"\nint main(void)\n{\n    return 0;\n}\n',
+    "firmware/dspic33/main_dspic33.c": '#include <xc.h>\n#include "hal_can.h"\nint main(void)\n{\n    return 0;\n}\n',
+    "firmware/dspic33/node_dspic33.c": '#include <xc.h>\n#include "hal_can.h"\nint main(void)\n{\n    return 0;\n}\n',
+    "firmware/arb_port.h": '#include "can_frame.h"\n',
+    "firmware/store/arb_nvm.c": '#include "arb_port.h"\n',
+    "firmware/host/arb_hostapi.h": '#include "arb_port.h"\n',
+    "pdcp/arbitrator/pdcp_arb.h": '#include "pdcp_codec.h"\n',
+    "pdcp/device/pdcp_device.h": '#include "pdcp_codec.h"\n',
     "hal/include/hal_can.h": '#include "can_frame.h"\n',
     "hal/dspic33/part.h": "#include <xc.h>\n",
     "tests/fakes/xc.h": "",
@@ -57,6 +62,13 @@ def test_tree_without_sources_is_an_error(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("path", "include"),
     [
+        ("pdcp/common/bad.c", '"pdcp_arb.h"'),
+        ("pdcp/arbitrator/bad.c", '"pdcp_device.h"'),
+        ("pdcp/device/bad.c", '"pdcp_arb.h"'),
+        ("profile/bad.c", '"pdcp_device.h"'),
+        ("profile/bad.c", '"arb_port.h"'),
+        ("firmware/arb_bad.c", '"pdcp_device.h"'),
+        ("firmware/store/arb_bad.c", '"arb_hostapi.h"'),
         ("pdcp/bad.c", '"hal_can.h"'),
         ("pdcp/bad.c", '"../hal/include/hal_can.h"'),
         ("pdcp/bad.c", "<hal_can.h>"),
@@ -68,7 +80,7 @@ def test_tree_without_sources_is_an_error(tmp_path: Path) -> None:
         ("hal/include/hal_bad.h", '"pdcp_codec.h"'),
         ("hal/include/hal_bad.h", '"loop.h"'),
         ("hal/dspic33/bad.c", '"loop.h"'),
-        ("firmware/main_dspic33.c", '"sim_bus.h"'),
+        ("firmware/dspic33/main_dspic33.c", '"sim_bus.h"'),
         ("firmware/arb_bad.c", "<xc.h>"),
     ],
 )
@@ -100,6 +112,31 @@ def test_function_length(tmp_path: Path, folder: str) -> None:
     status, output = run_check(tmp_path, {f"{folder}/long.c": "int x;\n" + function_of(61)})
     assert status == 1
     assert output == [f"{folder}/long.c:3: function long_one has 61 lines, more than 60"]
+
+
+@pytest.mark.parametrize(("folder", "limit"), [("pdcp/common", 500), ("firmware/host", 500), ("hal/linux", 600)])
+def test_file_length(tmp_path: Path, folder: str, limit: int) -> None:
+    assert run_check(tmp_path, {f"{folder}/long.c": "int x;\n" * limit}) == (0, [])
+    status, output = run_check(tmp_path, {f"{folder}/long.c": "int x;\n" * (limit + 1)})
+    assert status == 1
+    assert output == [f"{folder}/long.c:{limit + 1}: the file has {limit + 1} lines, more than {limit}"]
+
+
+def test_circle_of_files_is_found(tmp_path: Path) -> None:
+    files = {
+        "profile/a.h": '#include "b.h"\n',
+        "profile/b.c": '#include "b.h"\n\n#include "c.h"\n',
+        "profile/b.h": "",
+        "profile/c.h": '#include "a.h"\n',
+        "profile/d.c": '#include "a.h"\n',
+    }
+    status, output = run_check(tmp_path, files)
+    assert status == 1
+    assert output == [
+        "profile/a.h:1: b.h includes a.h in turn: a circle",
+        "profile/b.c:3: c.h includes b.h in turn: a circle",
+        "profile/c.h:1: a.h includes c.h in turn: a circle",
+    ]
 
 
 def test_long_table_is_no_function(tmp_path: Path) -> None:

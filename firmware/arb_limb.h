@@ -20,7 +20,7 @@ enum {
 /* 2407h */
 typedef enum {
     ARB_ACTION_NONE = 0,
-    ARB_ACTION_SAVE = 1, /* argument: configuration, 0 = the active one */
+    ARB_ACTION_SAVE = 1, /* argument: configuration, 0 = the active one (D-PRO-16) */
     ARB_ACTION_LOAD = 2,
     ARB_ACTION_ERASE = 3,
     ARB_ACTION_AUTOCONFIGURE = 4,

@@ -17,7 +17,7 @@
  * connection, and a connection that the client has closed keeps its port until its frames are on the wire.
  *
  * Clients such as python-can's expect the answer to rawmode alone in one read. Frames for a connection are
- * therefore held back for SOCKETCAND_HOLD_MS after it, or until the client's next element. */
+ * therefore held back for SOCKETCAND_HOLD_MS after it, or until the client's next element (D-SIM-2). */
 #ifndef SOCKETCAND_SERVER_H
 #define SOCKETCAND_SERVER_H
 

@@ -657,7 +657,7 @@ static void link_original(profile_plan_t *plan)
     }
 }
 
-/* Is the original linked with all that it requires, and has no other one lost that which it had? */
+/* Is the original linked with all that it requires, and has no other one lost what it had (D-PRO-24)? */
 static void judge_original(profile_plan_t *plan)
 {
     if (plan->spoilt) {
@@ -669,7 +669,7 @@ static void judge_original(profile_plan_t *plan)
     next_original(plan);
 }
 
-/* --- Replacements [PROFILE listing 4.6] --- */
+/* --- Replacements [PROFILE listing 4.6], D-PRO-10 --- */
 
 /* The missing end of a link that has exactly one, and nothing that stands in for the other; NULL: it is not
  * broken. Notes its ends. */

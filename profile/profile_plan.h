@@ -32,7 +32,7 @@ typedef enum {
 } profile_plan_what_t;
 
 enum {
-    PROFILE_PLAN_DEPTH = 64, /* a chain of required inputs is followed so far; deeper ones fail */
+    PROFILE_PLAN_DEPTH = 64, /* a chain of required inputs is followed so far; deeper ones fail (D-PRO-17) */
     PROFILE_PLAN_SHARE = 8,  /* the search for one link with all that it requires may take one part in so many
                                 of the steps that are left: those behind it get theirs */
     PROFILE_BANNED_MAX = 8,
@@ -40,7 +40,7 @@ enum {
     PROFILE_PLAN_UNIT = 300   /* what cannot be cut takes no more: a slice may be longer by so much */
 };
 
-/* Channels looked at in one plan. What is not found within is not found. */
+/* Channels looked at in one plan (D-PRO-17). What is not found within is not found. */
 #define PROFILE_PLAN_STEPS 200000uL
 
 #define PROFILE_CHANNEL_BYTES PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)
@@ -140,7 +140,7 @@ bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t
 /* Would the link give an output a second sole-access input, as the tables are? */
 bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
 
-/* Is the device of an end only away for a moment: awaited, or being set up at this time? */
+/* Is the device of an end only away for a moment: awaited, or being set up at this time (D-PRO-13)? */
 bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end);
 
 #endif

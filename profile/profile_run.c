@@ -111,8 +111,9 @@ static uint8_t next_input_of(const pdcp_nodes_t *nodes, uint8_t node, uint8_t la
     return best;
 }
 
-/* Reads the configuration back from what the inputs of a device name as their sources; PDCP_NONE: of all. In
- * an order that does not depend on where they stand: of two that claim the same output the first one has it.
+/* Reads the configuration back from what the inputs of a device name as their sources (D-PRO-19); PDCP_NONE:
+ * of all. In an order that does not depend on where they stand: of two that claim the same output the first
+ * one has it.
  */
 static void read_back(profile_run_t *run, uint8_t node)
 {
@@ -283,7 +284,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
 }
 
 /* The host has taken a link away: it is none of the configuration any more, no plan makes it again, and what
- * requires its input rests. */
+ * requires its input rests (D-PRO-25). */
 static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 {
     run->plan.want[input] = PDCP_NONE;
@@ -296,7 +297,7 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 
 /* The audit has let the link of an input go. The pair is left out as one that could not be linked (D-PRO-14),
  * and what requires the input rests (D-BUS-40). Nothing is put in its place: somebody who disturbs a link
- * shall not get another limb by it. */
+ * shall not get another limb by it (D-PRO-26). */
 static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 {
     const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
@@ -491,7 +492,7 @@ static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t no
 }
 
 /* The link of an input is not to be: what the configuration has rests, what it has not goes. The host sees a
- * link of the configuration whose source is missing as inactive (D-BUS-10). */
+ * link of the configuration whose source is missing as inactive (D-BUS-10, D-PRO-15). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
@@ -668,14 +669,14 @@ static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
     return next_ms;
 }
 
-/* A plan for a new device waits for others that come with it. */
+/* A plan for a new device waits for others that come with it (D-PRO-12). */
 static bool awaits_arrivals(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     return !run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms);
 }
 
 /* What the host has asked for is finished first: an action, or a link. A plan made while a link is half made
- * would take it away again when it is whole; it could not be carried out earlier anyway. */
+ * would take it away again when it is whole; it could not be carried out earlier anyway (D-PRO-27). */
 static bool is_held_back(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     return run->what == PROFILE_PLAN_ENFORCE || pdcp_arb_link_running(arb) ||

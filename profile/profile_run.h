@@ -73,7 +73,7 @@ void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t no
 void profile_run_on_event(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
                           const pdcp_event_t *event);
 
-/* Is a device set up, and the start-up still to come? */
+/* Is a device set up (D-PRO-18), and the start-up still to come? */
 bool profile_run_is_starting(const profile_run_t *run);
 
 /* May the start-up begin: is a device set up, no link half made, and has there been quiet for

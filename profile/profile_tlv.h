@@ -44,7 +44,7 @@ enum {
     PROFILE_TLV_CONFIGURATION_BYTES = 6, /* what a configuration takes besides its links */
     PROFILE_TLV_FRAME_BYTES = 6,         /* what the string takes besides its configurations */
     PROFILE_TLV_SET_BYTES = 32,          /* a bit for each number from 0 to 255 */
-    PROFILE_TLV_NAMES_BYTES = 16         /* a bit for each hash of an identity */
+    PROFILE_TLV_NAMES_BYTES = 16         /* a bit for each hash of an identity (D-BUS-53) */
 };
 
 /* Reader ------------------------------------------------------------------------------------------------- */
@@ -62,8 +62,8 @@ typedef enum {
     PROFILE_TLV_ERR_PLACE = -4  /* an entry outside what it belongs to: a link outside a configuration, ... */
 } profile_tlv_status_t;
 
-/* Reads a string of any length, byte by byte. It skips codes that it does not know, takes missing values as 0
- * and input and output of a link in either order. Members are private but for numbers and names. */
+/* Reads a string of any length, byte by byte (D-PRO-20). It skips codes that it does not know, takes missing
+ * values as 0 and input and output of a link in either order. Only numbers and names are not private. */
 typedef struct {
     profile_tlv_on_link_t on_link; /* NULL: nobody is told */
     void *ctx;

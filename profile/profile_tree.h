@@ -1,8 +1,8 @@
 /* Words of the reference profile tree (docs/profiles.md, profile-layer.md 1) [PROFILE 4.2.2, 4.6.1].
  *
  * A profile is four components of four bits from the root of the tree, most significant first. The root tells
- * set points from sensor signals; below it even components belong to this tree, odd ones to vendors. The
- * lower word has priority. */
+ * set points from sensor signals; below it even components belong to this tree, odd ones to vendors
+ * (D-PRO-22). The lower word has priority. */
 #ifndef PROFILE_TREE_H
 #define PROFILE_TREE_H
 

@@ -121,8 +121,8 @@ static void start(firmware_t *self)
                               .counter = counter};
     const arb_settings_t settings = {.serial = hal_sys_serial(), .seed = hal_sys_random()};
     arb_app_init(&self->app, &self->port, &settings, hal_clock_ms());
-    /* Last: that reads the EEPROM, and frames that came meanwhile would be old or lost. Now they are
-     * repeated. */
+    /* Last (D-MCU-2): that reads the EEPROM, and frames that came meanwhile would be old or lost. Now they
+     * are repeated. */
     self->can = ecan1_open();
 }
 

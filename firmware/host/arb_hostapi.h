@@ -109,7 +109,7 @@ void arb_hostapi_on_frame(arb_hostapi_t *api, const arb_port_t *port, uint32_t n
                           const can_frame_t *frame);
 
 /* The host has closed its end: the event stream ends, and so does what it has begun to send. Requests that it
- * has sent are served to their end, but for those that would begin a stream. */
+ * has sent are served to their end, but for those that would begin a stream (D-API-17). */
 void arb_hostapi_on_host_gone(arb_hostapi_t *api);
 
 /* Serves what can be served and sends what can be sent. Returns true when the arbitrator was given something

@@ -250,8 +250,8 @@ static void start_resets(arb_call_t *call, uint8_t first, uint8_t last)
     }
 }
 
-/* Devices have the numbers that they had when the request came, and only those that were reset have their
- * bit. */
+/* D-API-12: devices have the numbers that they had when the request came, and only those that were reset
+ * have their bit. */
 static void put_results(arb_call_t *call)
 {
     const arb_turn_t *turn = &call->api->turn;

@@ -56,14 +56,14 @@ static inline bool arb_hostevents_wants(const arb_hostevents_t *events, arb_even
 /* From now on these kinds; events of others that still wait are never sent. */
 void arb_hostevents_set_mask(arb_hostevents_t *events, uint16_t mask);
 
-/* The host is gone: whoever comes next has not asked for anything. */
+/* The host is gone: whoever comes next has not asked for anything (D-API-14). */
 void arb_hostevents_end(arb_hostevents_t *events);
 
 /* An event of the arbitrator; those that are of no kind, or of one that is not wanted, are ignored. */
 void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                              const pdcp_event_t *event);
 
-/* A frame on the bus, received or sent. Only base frames are events. */
+/* A frame on the bus, received or sent. Only base frames are events (D-API-14). */
 void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const can_frame_t *frame);
 
 /* Another active configuration, or another number of stored ones. */

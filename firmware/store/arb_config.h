@@ -9,12 +9,12 @@
  *
  * seq counts writes, length is that of the string, all LSB first; the CRC-32 is that of the string followed
  * by bytes 0 to 7. A memory that holds nothing good reads as a string without configurations (1 0, 15 0), so
- * that whatever is read can be written back.
+ * that whatever is read can be written back (D-API-15).
  *
  * One job at a time: it is started by a function below and carried on by arb_config_step in small steps (one
  * page written or ARB_CONFIG_READ_MAX bytes read), the last of which tells how it ended. What is already
  * stored is not written. What is written is read back and checked before its header makes it the newest
- * copy. */
+ * copy (D-PRO-21). */
 #ifndef ARB_CONFIG_H
 #define ARB_CONFIG_H
 

@@ -21,7 +21,7 @@ enum {
     ARB_FLAGS_RETRY_MS = 500
 };
 
-/* The flags [host-api.md 2404]. The two highest are not stored: the event stream belongs to a session. */
+/* The flags of 2404h (host-api.md 3). The two highest are not stored: the event stream is a session's. */
 enum {
     ARB_FLAG_AUTOCONFIGURE = 0x01,
     ARB_FLAG_HOT_SWAP = 0x02,

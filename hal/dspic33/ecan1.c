@@ -301,8 +301,8 @@ PART_INLINE bool fifo_holds_frames(void)
     return ((C1RXFUL1 >> FIFO_FIRST) | C1RXFUL2) != 0;
 }
 
-/* What finds no place in the ring stays in the FIFO until hal_can_receive has made room. After an overflow
- * the controller's pointer may stand at an empty buffer. */
+/* D-MCU-1: what finds no place in the ring stays in the FIFO until hal_can_receive has made room. After an
+ * overflow the controller's pointer may stand at an empty buffer. */
 PART_INLINE void drain_fifo(void)
 {
     while (fifo_holds_frames() && ring_count(&ecan1.rx_ring) != RX_PLACES) {

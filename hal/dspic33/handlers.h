@@ -16,7 +16,7 @@ void PART_HANDLER _U1TXInterrupt(void);
 void PART_HANDLER _MI2C1Interrupt(void);
 
 /* For every trap and every interrupt without a handler, by the vendor's linker scripts: written down, then
- * the program starts again. No application code can go on after one of them. */
+ * the program starts again (D-MCU-7). No application code can go on after one of them. */
 void PART_HANDLER _DefaultInterrupt(void);
 
 #endif

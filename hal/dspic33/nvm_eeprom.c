@@ -50,7 +50,7 @@ static bool start(hal_nvm_t *self, uint16_t address, uint16_t out_size, uint8_t 
 }
 
 /* After a reset of the processor alone the EEPROM may still be writing, and does not answer before it is
- * done. */
+ * done (D-MCU-3). */
 static bool may_be_writing(const hal_nvm_t *self, i2c1_status_t status)
 {
     return status == I2C1_NO_ANSWER && hal_clock_ms() - self->sent_ms <= WRITES_MS;

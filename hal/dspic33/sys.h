@@ -11,7 +11,7 @@
 typedef enum {
     SYS_RESET_TRAP = 0,     /* a trap, see sys_fault; or two at once */
     SYS_RESET_WATCHDOG = 1, /* the main loop or the tick hung */
-    SYS_RESET_ILLEGAL = 2,  /* illegal instruction, or a pin select register that changed by itself */
+    SYS_RESET_ILLEGAL = 2,  /* illegal instruction, or a pin select register changed by itself (D-MCU-4) */
     SYS_RESET_SOFTWARE = 3,
     SYS_RESET_PIN = 4,
     SYS_RESET_BROWN_OUT = 5,

@@ -415,6 +415,7 @@ static void on_control(struct libusb_transfer *transfer)
     fail(can, transfer->status == LIBUSB_TRANSFER_NO_DEVICE ? "the adapter was pulled out" : reason);
 }
 
+/* After bus-off the adapter goes on if it can, and is reset otherwise (D-LIN-3). */
 static void can_gs_usb_restart(hal_can_t *base)
 {
     can_gs_usb_t *can = (can_gs_usb_t *)base;

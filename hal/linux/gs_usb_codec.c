@@ -149,7 +149,7 @@ void gs_usb_codec_note(const gs_usb_codec_frame_t *frame, hal_can_health_t *heal
     }
 }
 
-/* --- bit timing --- */
+/* --- bit timing (D-LIN-2) --- */
 
 /* One setting, and how good it is: smaller is better, the bit rate first. */
 typedef struct {

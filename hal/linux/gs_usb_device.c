@@ -127,6 +127,7 @@ bool gs_usb_device_is_permitted(const gs_usb_device_t *description)
 
 /* --- opening --- */
 
+/* Without a serial number only what is known by vendor and product (D-LIN-1). */
 static bool is_wanted(const gs_usb_device_t *description, const char *serial)
 {
     return serial[0] == '\0' ? description->known : strcmp(description->serial, serial) == 0;

@@ -161,7 +161,8 @@ static bool open_pty(pty_t *pty)
     return make_fresh(pty);
 }
 
-/* A stale link goes before the terminal is made: the new one may get the number that the link names. */
+/* A stale link goes before the terminal is made (D-LIN-4): the new one may get the number that the link
+ * names. */
 static bool open_all(pty_t *pty, const char *link)
 {
     if (link != NULL && is_stale_link(link) && unlink(link) != 0) {

@@ -213,7 +213,7 @@ static bool is_reset_answer(const can_frame_t *frame)
     return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
 }
 
-/* Has it granted an id to a device (D-BUS-42)? */
+/* Has it granted an id to a device (D-BUS-42)? One that is lost counts (D-BUS-50). */
 static bool has_own(const pdcp_arb_t *arb)
 {
     return pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_FREE) +
@@ -276,7 +276,7 @@ static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked
 }
 
 /* Nobody else has answered the request that is held. Of many that came together a few are set up at once, the
- * others follow one by one: they would only wait for each other. */
+ * others follow one by one: they would only wait for each other (D-BUS-49). */
 static void on_held(pdcp_arb_t *arb, uint8_t place)
 {
     const pdcp_node_t held = *node_of(arb, place);
@@ -335,7 +335,7 @@ static void reset_stranger(pdcp_arb_t *arb, uint8_t id)
 }
 
 /* Without a bus what waits is stale when there is one again; requests repeat themselves, and an answer to
- * what has been given up long ago would be taken for that to a newer one. */
+ * what has been given up long ago would be taken for that to a newer one (D-BUS-28). */
 static void discard_queue(pdcp_arb_t *arb)
 {
     arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
@@ -475,7 +475,7 @@ static bool on_frame_on_standby(pdcp_arb_t *arb, const can_frame_t *frame)
 }
 
 /* Its own beacons have not left for too long: others may have taken over. It sends nothing and listens
- * (D-BUS-42). */
+ * (D-BUS-42, D-BUS-51). */
 static void listen(pdcp_arb_t *arb)
 {
     arb->listening = true;
@@ -626,7 +626,7 @@ static void setup_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *re
 {
     const pdcp_node_t *device = node_of(arb, node);
     if (pdcp_setup_on_reply(&arb->bus, node, reply) ==
-        PDCP_ERR_UNKNOWN) { /* another device has this id, too */
+        PDCP_ERR_UNKNOWN) { /* another device has this id, too (D-BUS-54) */
         reset_stranger(arb, device->node_id);
         lose(arb, node);
         return;
@@ -720,7 +720,7 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 
 /* A frame on the id of an output. It is a stranger's if the output's device is lost, or the output was told
  * to be silent and has had time to be: then it says nothing of the owner, and the output gets another id
- * before it is enabled (D-BUS-36). */
+ * before it is enabled (D-BUS-36, D-BUS-46). */
 static bool on_channel_data(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
 {
     pdcp_node_t *device = node_of(arb, node);
@@ -738,7 +738,7 @@ static bool on_channel_data(pdcp_arb_t *arb, uint8_t node, const can_frame_t *fr
 }
 
 /* A frame came from a bound id whose identity asks again, and was no answer to the request under way:
- * whatever it says, its owner is alive (D-BUS-41). */
+ * whatever it says, its owner is alive (D-BUS-23, D-BUS-41). */
 static void end_check(pdcp_arb_t *arb, uint8_t node)
 {
     if (node_of(arb, node)->request.client == PDCP_CLIENT_BIND) {

@@ -197,7 +197,7 @@ void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
 
 /* --- Answers --- */
 
-/* Does the value say what the tables say? */
+/* Does the value say what the tables say? An output without a link may be the host's (D-BUS-60). */
 static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];

@@ -87,7 +87,7 @@ void pdcp_audit_on_change(struct pdcp_bus *bus);
 /* PDCP_TIMER_AUDIT is due; calm: nothing else is to be done, so a question may be asked. */
 void pdcp_audit_on_deadline(struct pdcp_bus *bus, bool calm);
 
-/* A reply to a question. */
+/* A reply to a question. Silence is no evidence (D-BUS-59). */
 void pdcp_audit_on_reply(struct pdcp_bus *bus, const pdcp_reply_t *reply);
 
 #endif

@@ -184,7 +184,7 @@ static uint8_t choose_id(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8
     if (is_free(bus, asked) && !is_remembered(&bus->bind, asked) && is_quiet(bus, asked)) {
         return asked;
     }
-    return is_free(bus, reserved) ? reserved : pick_id(bus, PDCP_NODE_MIN, 1);
+    return is_free(bus, reserved) ? reserved : pick_id(bus, PDCP_NODE_MIN, 1); /* D-BUS-24 */
 }
 
 /* [PDCP 3.2.1]: the answer goes to the id that was asked for. */

@@ -72,8 +72,8 @@ pdcp_bind_result_t pdcp_bind_on_request(struct pdcp_bus *bus, const pdcp_identit
  * pdcp_bind_on_request left open. */
 pdcp_bind_result_t pdcp_bind_after_check(struct pdcp_bus *bus, uint8_t node, bool answered);
 
-/* Is no output given an id at this time, because somebody may still speak on any or listen to it (D-BUS-36)?
- */
+/* Is no output given an id at this time, because somebody may still speak on any or listen to it (D-BUS-36,
+ * D-BUS-48)? */
 bool pdcp_bind_is_shut(const struct pdcp_bus *bus);
 
 /* The node id that an output without one is to have: one that nobody owns, speaks on or listens to, and while

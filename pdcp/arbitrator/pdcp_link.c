@@ -16,7 +16,7 @@ typedef enum {
     STEP_TYPE,
     STEP_NODES,
     STEP_INPUT_ON,
-    STEP_OUTPUT_ID_AGAIN, /* only when a link is written again */
+    STEP_OUTPUT_ID_AGAIN, /* only when a link is written again, whatever differed (D-BUS-57) */
     STEP_OUTPUT_ON,
     STEP_END
 } step_t;
@@ -416,7 +416,7 @@ static void end(pdcp_bus_t *bus)
 }
 
 /* Nothing more is to be written forwards. Once the source was written, steps run backwards, the failed one
- * first: whether it was carried out nobody knows. */
+ * first: whether it was carried out nobody knows (D-BUS-21). */
 static void give_up(pdcp_bus_t *bus, pdcp_status_t status)
 {
     pdcp_channel_t *input = channel_of(bus, bus->link.input);

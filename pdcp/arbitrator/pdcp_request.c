@@ -190,7 +190,7 @@ static bool on_failure(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t result, pdc
 }
 
 /* A packet that was sent more than once may be answered more than once. An answer that came later would be
- * taken for that to the next packet, which may be lost: the next one waits (D-BUS-39). */
+ * taken for that to the next packet, which may be lost: the next one waits (D-BUS-39, D-BUS-52). */
 static void await_echoes(pdcp_bus_t *bus, pdcp_node_t *device)
 {
     device->request.tries_left = (uint8_t)(PDCP_TRIES - 1 - device->request.tries_left);
@@ -286,7 +286,7 @@ static bool on_packet(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *ms
 
 /* Does an answer tell of another value than the one that this arbitrator has written by itself, so that it
  * belongs to an earlier write? A device that repeats none, or less, is believed; what the host writes, a
- * device may correct. */
+ * device may correct (D-BUS-55). */
 static bool tells_of_another_write(const pdcp_request_t *request, const pdcp_msg_t *msg)
 {
     const size_t len = msg->len < request->size ? msg->len : request->size;

@@ -12,6 +12,7 @@ enum {
     PARAM = 0x3F
 };
 
+/* The acknowledgement time comes first of the two times (D-BUS-27). */
 static const step_t device_steps[] = {PDCP_DEV_VID_PID | MANDATORY,
                                       PDCP_DEV_SERIAL,
                                       PDCP_DEV_TYPE_PROFILE,
@@ -84,7 +85,8 @@ static void no_room(pdcp_bus_t *bus, pdcp_node_t *device)
     give_up(bus, device);
 }
 
-/* Writes of the setup: transfer enabled 0, and the node id of an output. */
+/* Writes of the setup: transfer enabled 0, and the node id of an output, for which it may have to wait
+ * (D-BUS-48). */
 static void write_step(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param)
 {
     pdcp_channel_t *channel = current_channel(bus, device);

@@ -20,7 +20,7 @@ typedef struct {
     uint32_t unbound_ms;  /* on standby: when the first of the requests below came */
     uint8_t beacons;      /* how many of beacon_ms are known */
     bool answered;        /* answered_ms means something */
-    bool doubted;         /* it let bind requests go unanswered: its beacons alone prove nothing */
+    bool doubted;         /* it let bind requests go unanswered: its beacons alone prove nothing (D-BUS-50) */
     uint8_t asked_id;     /* node id of its last request, 0: none that is not answered yet; */
     uint8_t asked_code;   /* its function code, */
     bool asked_identity;  /* and it asks for parameter 1 or 2: that is no service */

@@ -3,7 +3,7 @@
 #include "pdcp_bus.h"
 
 /* Beacons until a time is over. The first one may leave at once, and a part of the last interval counts as a
- * whole one: up to a second too many, and none too few. */
+ * whole one: up to a second too many, and none too few (D-BUS-58). */
 static uint8_t beacons_in(uint16_t time_ms)
 {
     return time_ms == 0 ? (uint8_t)PDCP_SUSPENDED_FOR_GOOD : (uint8_t)((time_ms - 1u) / PDCP_BEACON_MS + 2u);

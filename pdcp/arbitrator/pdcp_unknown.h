@@ -35,7 +35,7 @@ void pdcp_unknown_init(pdcp_unknown_t *unknown, uint32_t now_ms);
 /* Lets time pass; to be called every few days at least. */
 void pdcp_unknown_on_time(pdcp_unknown_t *unknown, uint32_t now_ms);
 
-/* A frame came from this id, or its owner was just forgotten. */
+/* A frame came from this id, or its owner was just forgotten (D-BUS-47). */
 void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id);
 
 /* An answer to Reset Device came from this id. If the id was told to reset, its speaker is silent from now

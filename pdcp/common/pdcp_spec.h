@@ -1,5 +1,5 @@
 /* Numbers of the protocol, each with its source. [PDCP] is the bus protocol, [PROFILE] the thesis on the
- * profile layer, D-BUS-n a decision of docs/decisions.md. */
+ * profile layer, D-BUS-n a decision of docs/spec. */
 #ifndef PDCP_SPEC_H
 #define PDCP_SPEC_H
 

@@ -225,7 +225,8 @@ static void on_bind_answer(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t
     if (msg->node_id == dev->node_id) {
         enter(dev, PDCP_DEVICE_BOUND, now_ms);
     } else if (msg->node_id == PDCP_NODE_REFUSED) {
-        dev->node_id = 0; /* no answer is awaited any more: a grant would be for a twin with this identity */
+        /* No answer is awaited any more: a grant would be for a twin with this identity (D-BUS-56). */
+        dev->node_id = 0;
         dev->stats.bind_refused++;
     } else if (!is_node_id(msg->node_id) || dev->suggestions >= SUGGESTIONS_MAX) {
         dev->stats.drop_bind++;

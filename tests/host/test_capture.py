@@ -224,7 +224,7 @@ def test_socketcand_takes_host_port_and_name(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_a_socketcand_server_that_ends_is_noticed() -> None:
-    """On the wire as architecture.md has it: hi, open, ok, rawmode, ok, frames."""
+    """On the wire as architecture.md 3 has it: hi, open, ok, rawmode, ok, frames."""
 
     opened = threading.Event()
 

@@ -282,6 +282,7 @@ const flood_row_t flood_rows[] = {
      .interval_us = 100000,
      .count = 1,
      .limits = {ANY, 500, 0, 5000, 5000, 80, 100, 100}},
+    /* Nothing takes the place of the links that are given up (D-PRO-26). */
     {.name = "source",
      .what = "10 forged parameters 7 a second",
      .make = make_other_source,

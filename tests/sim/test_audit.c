@@ -241,8 +241,8 @@ static void test_a_repair_costs_no_data(void)
 /* --- Three repairs in a minute --- */
 
 /* Somebody disables the required input of the controller again and again: its link becomes inactive, what
- * requires it rests (D-PRO-9), and the pair is left out for 5 s (D-PRO-14). When it is over, all comes back.
- */
+ * requires it rests (D-PRO-9), and the pair is left out for 5 s (D-PRO-14, D-PRO-26). When it is over, all
+ * comes back. */
 static void test_a_link_that_cannot_be_kept(void)
 {
     static const uint8_t hot_swap_only = 0x02; /* flags: nothing else is made up instead */

@@ -268,8 +268,8 @@ static void test_a_link_that_cannot_be_made_holds_up_no_action(void)
     limb_expect(&limb, "2.2>1.1 3.1>2.1");
 }
 
-/* D-PRO-23: a link that is made again while a plan waits for that is not taken away by the plan, which was
- * made without it. */
+/* D-PRO-23, D-PRO-27: a link that is made again while a plan waits for that is not taken away by the plan,
+ * which was made without it. */
 static void test_a_link_made_again_outlives_the_plan_that_waited(void)
 {
     static const uint8_t flags = ARB_FLAGS_FACTORY & ~ARB_FLAG_HOT_SWAP;

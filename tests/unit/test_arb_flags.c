@@ -1,4 +1,4 @@
-/* The stored flags (host-api.md 3, 2404) and what one memory's users owe each other. */
+/* The stored flags of 2404h (host-api.md 3) and what one memory's users owe each other. */
 #include <string.h>
 
 #include "arb_crc.h"

@@ -172,7 +172,7 @@ static void test_an_input_that_refused_to_be_disabled(void)
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
-/* A host may read an output without a link: what it has enabled stays enabled. */
+/* D-BUS-60: a host may read an output without a link: what it has enabled stays enabled. */
 static void test_an_output_that_the_host_has_enabled(void)
 {
     x.arb->bus.nodes.channels[output()].enabled = true;

@@ -182,7 +182,7 @@ static void test_what_the_host_has_suspended_stays_so(void)
     expect_release("311#08 0000");
 }
 
-/* For a time: it counts as suspended for that time at least, and up to a second longer. */
+/* D-BUS-58: for a time: it counts as suspended for that time at least, and up to a second longer. */
 static void suspended_for(uint16_t time_ms, const char *frame, const char *answer)
 {
     setUp();
@@ -257,7 +257,7 @@ static void test_a_suspension_of_all(void)
     expect_release("311#08 0000");
 }
 
-/* A device that was bound anew is not suspended any more. */
+/* A device that was bound anew is not suspended any more (D-BUS-58). */
 static void test_a_suspension_ends_with_the_binding(void)
 {
     suspend(0, "311#08 0000", "211#88 01 0000");

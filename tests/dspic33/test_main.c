@@ -163,7 +163,7 @@ static void assert_answer(const uint8_t *bytes, size_t size)
     TEST_ASSERT_EQUAL_HEX8_ARRAY(bytes, &fake.uart_sent[fake.uart_sent_count - size], size);
 }
 
-/* host-api.md 1: 2201h, and 2202h with 3 devices, 4 inputs, 4 outputs, 3 links. */
+/* host-api.md 1 and 2: 2201h, and 2202h with 3 devices, 4 inputs, 4 outputs, 3 links. */
 static const uint8_t get_info[] = {0xFE, 0x19, 0x01, 0x22, 0x01, 0xEB, 0x00, 0x00};
 static const uint8_t info[] = {0xFE, 0x19, 0x02, 0x22, 0x01, 0x33, 0x06,
                                0x00, 0x03, 0x04, 0x04, 0x03, 0x7B, 0x3F};

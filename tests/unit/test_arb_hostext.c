@@ -190,7 +190,7 @@ static void test_an_action_with_its_result(void)
 
 /* --- 240Ah, 240Dh --- */
 
-/* An empty memory reads as no configurations: 1 0, 15 0 (profile-layer.md 5). */
+/* An empty memory reads as no configurations: 1 0, 15 0 (D-API-15). */
 static void test_reading_configurations(void)
 {
     exchange_pass(&x, 600);

@@ -15,7 +15,6 @@ from .frames import Frame
 from .functions import FUNCTIONS, Function, Values, code_class, sizes_text, split, word_at
 from .model import ChannelId, Identity
 from .parameters import (
-    NO_CHANNEL,
     TRANSFER_KINDS,
     TRANSFER_TYPE,
     Form,
@@ -27,20 +26,17 @@ from .parameters import (
     show_profile,
 )
 from .profiles import channel_value
+from .protocol import NO_CHANNEL, NODE_MAX, TEXTS, FunctionCode, Response
 
 __all__ = ["Decoded", "Decoder", "Field", "format_line", "to_json"]
 
 _BINDING = 3
-_NODE_MAX = 254
 _UNUSED_NODE = 255
-_FAILURE, _SUCCESS, _USE_BULK = 0, 1, 2
-_RESPONSES = {_FAILURE: "failure", _SUCCESS: "success"}
-_PARAMETER_RESPONSES = {**_RESPONSES, _USE_BULK: "use bulk transfer"}
+_PARAMETER_RESPONSES = TEXTS["response"]
+_RESPONSES = {number: text for number, text in _PARAMETER_RESPONSES.items() if number != Response.USE_BULK}
 _OTHER_KINDS = {"extended": "Extended Frame", "remote": "Remote Frame", "error": "Error Frame", "fd": "CAN FD Frame"}
-_BROADCASTS = (0x08, 0x09, 0x0A, 0x0B)
-_BEACON = 0x0A
+_BROADCASTS = (FunctionCode.SUSPEND, FunctionCode.RELEASE, FunctionCode.BEACON, FunctionCode.RESET)
 _ANSWERED = (0x03, 0x04, 0x08, 0x09, 0x0B, 0x0C, 0x0D, 0x0F)
-_DEPRECATED = (0x02, 0x05, 0x06, 0x07, 0x82, 0x85, 0x86, 0x87)
 
 # Parameters of channels that the decoder learns from.
 _TYPE, _SOURCE_CHANNEL, _SOURCE_NODES = 1, 6, 7
@@ -327,7 +323,7 @@ class Decoder:
 
     def _fields(self, decoded: Decoded, function: Function) -> None:
         values = split(function, decoded.frame.data)
-        if decoded.code in _DEPRECATED:
+        if function.deprecated:
             decoded.notes.append("deprecated")
         if "response" in dict(function.layout):
             decoded.fields.append(self._response(decoded, values))
@@ -346,7 +342,7 @@ class Decoder:
 
     def _response(self, decoded: Decoded, values: Values) -> Field:
         if "response" not in values:
-            return Field("response", _SUCCESS, "success (not said, D-BUS-18)")
+            return Field("response", int(Response.SUCCESS), "success (not said, D-BUS-18)")
         number = values["response"]
         names = _PARAMETER_RESPONSES if decoded.code in (0x83, 0x84) else _RESPONSES
         return Field("response", number, names.get(number, f"{number} (not defined)"))
@@ -361,7 +357,7 @@ class Decoder:
             return
         number = values["parameter"]
         decoded.fields += _place_fields(channel, number, kind)
-        if values.tail or (decoded.code == 0x83 and values["response"] == _SUCCESS):
+        if values.tail or (decoded.code == 0x83 and values["response"] == Response.SUCCESS):
             decoded.fields += _value_fields(_parameter_of(channel, number, kind), values.tail)
 
     def _kind(self, decoded: Decoded, values: Values) -> Kind | None:
@@ -397,7 +393,7 @@ class Decoder:
             decoded.problem = "a bind request has priority 3"
         elif decoded.from_arbitrator and decoded.node == 0 and decoded.code not in (*_BROADCASTS, 0x81):
             decoded.problem = "this is not sent to all"
-        elif decoded.from_arbitrator and decoded.node and decoded.code == _BEACON:
+        elif decoded.from_arbitrator and decoded.node and decoded.code == FunctionCode.BEACON:
             decoded.problem = "an arbitrator beacons to all"
 
     # --- learning ---
@@ -453,7 +449,7 @@ class Decoder:
         requested, granted = decoded.node, values["node"]
         identity = _identity(values)
         decoded.device = identity
-        if granted != requested or not 1 <= granted <= _NODE_MAX:
+        if granted != requested or not 1 <= granted <= NODE_MAX:
             return
         device = self._devices.get(granted)
         if device is None or device.identity != identity:
@@ -471,7 +467,7 @@ class Decoder:
     def _answered(self, decoded: Decoded, device: _Device, values: Values) -> None:
         channel, parameter = values["channel"], values["parameter"]
         written = device.written.pop((channel, parameter), b"") if decoded.code == 0x84 else b""
-        if values.get("response") == _SUCCESS:
+        if values.get("response") == Response.SUCCESS:
             self._learn(decoded.node, device, channel, parameter, values.tail or written)
 
     def _learn(self, node: int, device: _Device, channel: int, parameter: int, value: bytes) -> None:
@@ -499,7 +495,7 @@ class Decoder:
             self._output_node(word_at(value, 1, 1), _Output(word_at(value, 0, 1), known.source_channel))
 
     def _output_node(self, node: int, output: _Output) -> None:
-        if 1 <= node <= _NODE_MAX and node != output.node:
+        if 1 <= node <= NODE_MAX and node != output.node:
             for old in [key for key, other in self._outputs.items() if other == output and output.index]:
                 del self._outputs[old]
             self._outputs[node] = output
@@ -512,7 +508,7 @@ class Decoder:
         asked = (values["parameter"], values["channel"], decoded.code == 0x8D)
         if transfer is None or asked != (transfer.parameter, transfer.channel, transfer.to_device):
             return
-        if values["response"] != _SUCCESS:
+        if values["response"] != Response.SUCCESS:
             device.transfer = None
         else:
             transfer.size = values["size"]
@@ -542,7 +538,7 @@ class Decoder:
         transfer = device.transfer
         if transfer is None or transfer.size < 0 or transfer.to_device == decoded.from_arbitrator:
             decoded.notes.append("no transfer is known")
-        elif values["response"] != _SUCCESS:
+        elif values["response"] != Response.SUCCESS:
             device.transfer = None
         elif transfer.waiting is not None:
             transfer.data += transfer.waiting

@@ -10,56 +10,26 @@
 """
 
 from collections.abc import Iterable
-from enum import IntEnum
 
 from .model import Identity
+from .protocol import TEXTS, ErrorCode
 
-
-class ErrorCode(IntEnum):
-    """The error code of a failure answer (D-API-4)."""
-
-    WRONG_SIZE = 0x01
-    OUT_OF_RANGE = 0x02
-    UNKNOWN_DEVICE = 0x03
-    UNKNOWN_CHANNEL = 0x04
-    DEVICE_SILENT = 0x05
-    DEVICE_REFUSED = 0x06
-    BUSY = 0x07
-    SOLE_ACCESS = 0x08
-    NO_NODE_ID = 0x09
-    BULK_FAILED = 0x0A
-    NOT_READY = 0x0B
-    CRC = 0x0C
-    STORAGE = 0x0D
-    NOT_SUPPORTED = 0x0E
-    BAD_VALUE = 0x0F
-
-
-_MEANINGS = {
-    ErrorCode.WRONG_SIZE: "wrong payload size",
-    ErrorCode.OUT_OF_RANGE: "number out of range",
-    ErrorCode.UNKNOWN_DEVICE: "unknown device",
-    ErrorCode.UNKNOWN_CHANNEL: "unknown channel or wrong direction",
-    ErrorCode.DEVICE_SILENT: "the device did not answer",
-    ErrorCode.DEVICE_REFUSED: "the device refused",
-    ErrorCode.BUSY: "the arbitrator is busy",
-    ErrorCode.SOLE_ACCESS: "another input has sole access to this output",
-    ErrorCode.NO_NODE_ID: "no free node id",
-    ErrorCode.BULK_FAILED: "the bulk transfer failed",
-    ErrorCode.NOT_READY: "not ready, setup still running",
-    ErrorCode.CRC: "the request arrived with a wrong checksum",
-    ErrorCode.STORAGE: "the storage failed or is full",
-    ErrorCode.NOT_SUPPORTED: "not supported",
-    ErrorCode.BAD_VALUE: "bad value",
-}
+__all__ = [
+    "BadAnswerError",
+    "ConnectionFailedError",
+    "ErrorCode",
+    "NoAnswerError",
+    "PdcpError",
+    "RequestError",
+    "ResetError",
+    "UnknownMessageError",
+    "meaning",
+]
 
 
 def meaning(code: int) -> str:
     """What an error code says, in words; also of a code that nobody knows yet."""
-    try:
-        return _MEANINGS[ErrorCode(code)]
-    except ValueError:
-        return "unknown error"
+    return TEXTS["error"].get(code, "unknown error")
 
 
 class PdcpError(Exception):

@@ -2,39 +2,31 @@
 
 import struct
 from dataclasses import dataclass
-from enum import IntEnum
 
 from .messages import EventMessage, FormatError
 from .model import ChannelId, Identity, LinkStatus
+from .protocol import BusState, EventKind
 
-
-class EventKind(IntEnum):
-    """Kinds of events; bit kind - 1 of the mask asks for one."""
-
-    DEVICE_BOUND = 1
-    DEVICE_LOST = 2
-    LINK_CHANGED = 3
-    CONFIGURATION_CHANGED = 4
-    CAN_FRAME = 5
-    BUS_STATE = 6
-    AUDIT = 9
-
-    @property
-    def mask(self) -> int:
-        return 1 << (self - 1)
+__all__ = [
+    "ALL_KINDS",
+    "QUIET_KINDS",
+    "AuditDifference",
+    "BusState",
+    "BusStateChanged",
+    "CanFrame",
+    "ConfigurationChanged",
+    "DeviceBound",
+    "DeviceLost",
+    "Event",
+    "EventKind",
+    "LinkChanged",
+    "UnknownEvent",
+    "parse",
+]
 
 
 ALL_KINDS = frozenset(EventKind)
 QUIET_KINDS = ALL_KINDS - {EventKind.CAN_FRAME}  # all that a person can follow
-
-
-class BusState(IntEnum):
-    """Of the arbitrator's CAN controller; SILENT: a hot standby (D-BUS-12)."""
-
-    ACTIVE = 0
-    PASSIVE = 1
-    OFF = 2
-    SILENT = 3
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,230 +1,106 @@
+# generated from docs/spec/protocol.toml by tools/gen_protocol.py; do not edit
 """The messages of the host API [API 3.2, 3.3], and the extension group 24xxh (D-API-5).
 
-Each message is a dataclass whose fields are its payload, in the order of the wire; all are packed and unpacked by the
-same few lines. The success answer of request n is n + 1, its failure answer n + 2.
-"""
+Each message is a dataclass whose fields are its payload, in the order of the wire (payload.py). The success
+answer of request n is n + 1, its failure answer n + 2."""
 
-import struct
-from dataclasses import dataclass, fields
-from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar, cast, get_args, get_type_hints
+from dataclasses import dataclass
 
-from .model import ChannelId, Identity
-from .wire import Frame
+from .payload import (
+    MESSAGES,
+    U8,
+    U16,
+    U32,
+    Chan,
+    Dev,
+    Failure,
+    FormatError,
+    Mask,
+    Message,
+    Octets,
+    Request,
+    Rest,
+    U32s,
+    Value,
+    unpack,
+)
 
-
-class FormatError(ValueError):
-    """A payload, or a value for one, that does not fit its message."""
-
-
-# --- fields ---
-
-
-# How fields stand in a payload. take() returns the value at the front and how many bytes it has; it raises IndexError
-# when there are too few.
-
-
-@dataclass(frozen=True)
-class _Unsigned:
-    """A number, LSB first."""
-
-    size: int
-
-    def pack(self, value: int) -> bytes:
-        try:
-            return value.to_bytes(self.size, "little")
-        except OverflowError:
-            raise FormatError(f"{value} does not fit {8 * self.size} bits") from None
-
-    def take(self, data: bytes) -> tuple[int, int]:
-        if len(data) < self.size:
-            raise IndexError
-        return int.from_bytes(data[: self.size], "little"), self.size
-
-
-class _Device:
-    """VID, PID, SN."""
-
-    _layout = struct.Struct("<HHH")
-
-    def pack(self, value: Identity) -> bytes:
-        try:
-            return self._layout.pack(value.vid, value.pid, value.sn)
-        except struct.error:
-            raise FormatError(f"{value} does not fit three times 16 bits") from None
-
-    def take(self, data: bytes) -> tuple[Identity, int]:
-        if len(data) < self._layout.size:
-            raise IndexError
-        return Identity(*self._layout.unpack_from(data)), self._layout.size
-
-
-class _ChannelOfDevice:
-    """VID, PID, SN, channel index."""
-
-    def pack(self, value: ChannelId) -> bytes:
-        return _Device().pack(value.identity) + _Unsigned(1).pack(value.index)
-
-    def take(self, data: bytes) -> tuple[ChannelId, int]:
-        identity, size = _Device().take(data)
-        return ChannelId(identity, data[size]), size + 1
-
-
-@dataclass(frozen=True)
-class _Bytes:
-    """So many bytes; without a size all that are left, at least so many."""
-
-    size: int | None = None
-    least: int = 0
-
-    def pack(self, value: bytes) -> bytes:
-        if len(value) < self.least or (self.size is not None and len(value) != self.size):
-            raise FormatError(f"{len(value)} bytes are not {self.size or f'{self.least} or more'}")
-        return value
-
-    def take(self, data: bytes) -> tuple[bytes, int]:
-        size = len(data) if self.size is None else self.size
-        if len(data) < max(size, self.least):
-            raise IndexError
-        return data[:size], size
-
-
-class _Counters:
-    """32-bit numbers to the end."""
-
-    def pack(self, value: tuple[int, ...]) -> bytes:
-        return b"".join(_Unsigned(4).pack(each) for each in value)
-
-    def take(self, data: bytes) -> tuple[tuple[int, ...], int]:
-        if len(data) % 4:
-            raise IndexError
-        return struct.unpack(f"<{len(data) // 4}I", data), len(data)
-
-
-class _Mask:
-    """One byte where that is enough, else two (D-API-20)."""
-
-    def pack(self, value: int) -> bytes:
-        return _Unsigned(1 if 0 <= value <= 0xFF else 2).pack(value)
-
-    def take(self, data: bytes) -> tuple[int, int]:
-        return _Unsigned(min(max(len(data), 1), 2)).take(data)
-
-
-_Codec = _Unsigned | _Mask | _Device | _ChannelOfDevice | _Bytes | _Counters
-
-U8 = Annotated[int, _Unsigned(1)]
-U16 = Annotated[int, _Unsigned(2)]
-U32 = Annotated[int, _Unsigned(4)]
-Mask = Annotated[int, _Mask()]
-Dev = Annotated[Identity, _Device()]
-Chan = Annotated[ChannelId, _ChannelOfDevice()]
-Octets = Annotated[bytes, _Bytes(8)]
-Rest = Annotated[bytes, _Bytes()]
-Value = Annotated[bytes, _Bytes(least=1)]
-U32s = Annotated[tuple[int, ...], _Counters()]
-
-# --- kinds of messages ---
-
-MESSAGES: dict[int, type["Message"]] = {}  # by id
-
-AnswerT = TypeVar("AnswerT", bound="Message", covariant=True)
-
-
-class Message:
-    """A message without its header."""
-
-    ID: ClassVar[int]
-
-    def __init_subclass__(cls, id: int | None = None) -> None:
-        super().__init_subclass__()
-        if id is not None:
-            assert id not in MESSAGES, f"{id:04X}h twice"
-            cls.ID = id
-            MESSAGES[id] = cls
-
-    def pack(self) -> bytes:
-        """The payload. Raises FormatError when a value does not fit its field."""
-        parts = []
-        for name, codec in _layout(type(self)):
-            try:
-                parts.append(codec.pack(getattr(self, name)))
-            except FormatError as error:
-                raise FormatError(f"{type(self).__name__}, {name}: {error}") from None
-        return b"".join(parts)
-
-    @classmethod
-    def unpack(cls, payload: bytes) -> Self:
-        """Reads a payload. Raises FormatError when its size is wrong."""
-        values: dict[str, Any] = {}
-        at = 0
-        try:
-            for name, codec in _layout(cls):
-                values[name], size = codec.take(payload[at:])
-                at += size
-        except IndexError:
-            at = -1
-        if at != len(payload):
-            raise FormatError(f"{cls.ID:04X}h cannot have {len(payload)} bytes: {payload.hex(' ') or 'none'}")
-        return cls(**values)
-
-
-_layouts: dict[type[Message], list[tuple[str, _Codec]]] = {}
-
-
-def _layout(kind: type[Message]) -> list[tuple[str, _Codec]]:
-    """Names of the fields of a class, and how they stand in its payload."""
-    if kind not in _layouts:
-        hints = get_type_hints(kind, include_extras=True)
-        _layouts[kind] = [(each.name, get_args(hints[each.name])[1]) for each in fields(cast(Any, kind))]
-    return _layouts[kind]
-
-
-class Request(Message, Generic[AnswerT]):
-    """A message from the host. READS: it changes nothing, so that it may be sent again."""
-
-    READS: ClassVar[bool] = False
-
-    def __init_subclass__(cls, id: int | None = None, reads: bool = False) -> None:
-        super().__init_subclass__(id)
-        cls.READS = reads
-
-    @classmethod
-    def success(cls) -> type[AnswerT]:
-        """The class of its success answer."""
-        return cast(type[AnswerT], MESSAGES[cls.ID + 1])
-
-    @classmethod
-    def failure(cls) -> type[Message]:
-        return MESSAGES[cls.ID + 2]
-
-
-@dataclass(frozen=True)
-class Failure(Message):
-    """A failure answer with an error code (D-API-4)."""
-
-    error: U8
-
-
-def unpack(frame: Frame) -> Message:
-    """The message in a frame. Raises FormatError when there is no such message, or its size is wrong."""
-    try:
-        kind = MESSAGES[frame.message]
-    except KeyError:
-        raise FormatError(f"there is no message {frame.message:04X}h") from None
-    return kind.unpack(frame.payload)
-
+__all__ = [
+    "ArbitratorInfoFailure",
+    "ArbitratorInfoSuccess",
+    "ConfigureLink",
+    "ConfigureLinkFailure",
+    "ConfigureLinkSuccess",
+    "DeviceInfoFailure",
+    "DeviceInfoSuccess",
+    "EventMessage",
+    "Failure",
+    "FormatError",
+    "GetArbitratorInfo",
+    "GetDeviceInfo",
+    "GetInputInfo",
+    "GetLinkInfo",
+    "GetOutputInfo",
+    "GetParameter",
+    "GetParameterFailure",
+    "GetParameterSuccess",
+    "GetStatistics",
+    "GetSystemInfo",
+    "InputInfoFailure",
+    "InputInfoSuccess",
+    "LinkInfoFailure",
+    "LinkInfoSuccess",
+    "MESSAGES",
+    "Message",
+    "OutputInfoFailure",
+    "OutputInfoSuccess",
+    "Passthrough",
+    "PassthroughFailure",
+    "PassthroughSuccess",
+    "ProfileAction",
+    "ProfileActionFailure",
+    "ProfileActionSuccess",
+    "ReadConfigurations",
+    "ReadConfigurationsFailure",
+    "ReadConfigurationsSuccess",
+    "RemoveLink",
+    "RemoveLinkFailure",
+    "RemoveLinkSuccess",
+    "Request",
+    "Reset",
+    "ResetFailure",
+    "ResetSuccess",
+    "SetFlags",
+    "SetFlagsFailure",
+    "SetFlagsSuccess",
+    "SetParameter",
+    "SetParameterFailure",
+    "SetParameterSuccess",
+    "StatisticsFailure",
+    "StatisticsSuccess",
+    "StreamEvents",
+    "StreamEventsFailure",
+    "StreamEventsSuccess",
+    "SystemInfoFailure",
+    "SystemInfoSuccess",
+    "UnknownId",
+    "WriteConfigurations",
+    "WriteConfigurationsFailure",
+    "WriteConfigurationsSuccess",
+    "unpack",
+]
 
 # --- 22xxh: the tables ---
 
 
 @dataclass(frozen=True)
 class UnknownId(Message, id=0x2200):
-    pass
+    """Answer to an id that does not exist [API 3.3.1]."""
 
 
 @dataclass(frozen=True)
 class GetSystemInfo(Request["SystemInfoSuccess"], id=0x2201, reads=True):
-    pass
+    """How many devices, channels and links there are [API 3.3.2]."""
 
 
 @dataclass(frozen=True)
@@ -241,6 +117,8 @@ class SystemInfoFailure(Failure, id=0x2203):
 
 @dataclass(frozen=True)
 class GetDeviceInfo(Request["DeviceInfoSuccess"], id=0x2204, reads=True):
+    """A device, by its number from 1 [API 3.3.5]."""
+
     number: U8
 
 
@@ -257,6 +135,8 @@ class DeviceInfoFailure(Failure, id=0x2206):
 
 @dataclass(frozen=True)
 class GetInputInfo(Request["InputInfoSuccess"], id=0x2207, reads=True):
+    """An input channel, by its number from 1 [API 3.3.8]."""
+
     number: U8
 
 
@@ -273,6 +153,8 @@ class InputInfoFailure(Failure, id=0x2209):
 
 @dataclass(frozen=True)
 class GetOutputInfo(Request["OutputInfoSuccess"], id=0x220A, reads=True):
+    """An output channel, by its number from 1 [API 3.3.11]."""
+
     number: U8
 
 
@@ -289,6 +171,8 @@ class OutputInfoFailure(Failure, id=0x220C):
 
 @dataclass(frozen=True)
 class GetLinkInfo(Request["LinkInfoSuccess"], id=0x220D, reads=True):
+    """A link, by its number from 1 [API 3.3.14]."""
+
     number: U8
 
 
@@ -308,6 +192,8 @@ class LinkInfoFailure(Failure, id=0x220F):
 
 @dataclass(frozen=True)
 class GetParameter(Request["GetParameterSuccess"], id=0x2301, reads=True):
+    """Read a parameter of a device (index 0) or a channel [API 3.3.17]."""
+
     channel: Chan
     parameter: U8
 
@@ -323,6 +209,8 @@ class GetParameterFailure(Failure, id=0x2303):
 
 @dataclass(frozen=True)
 class SetParameter(Request["SetParameterSuccess"], id=0x2304):
+    """Write a parameter of a device (index 0) or a channel [API 3.3.20] (D-API-7)."""
+
     channel: Chan
     parameter: U8
     value: Value
@@ -339,6 +227,8 @@ class SetParameterFailure(Failure, id=0x2306):
 
 @dataclass(frozen=True)
 class ConfigureLink(Request["ConfigureLinkSuccess"], id=0x2307):
+    """Make a link [API 3.3.23] (D-API-6)."""
+
     output: Chan
     input: Chan
 
@@ -354,6 +244,8 @@ class ConfigureLinkFailure(Failure, id=0x2309):
 
 @dataclass(frozen=True)
 class Passthrough(Request["PassthroughSuccess"], id=0x230A):
+    """Send a frame to a device; success is the answer of the device [API 3.3.26] (D-API-11)."""
+
     device: Dev
     dlc: U8
     data: Octets
@@ -372,6 +264,8 @@ class PassthroughFailure(Failure, id=0x230C):
 
 @dataclass(frozen=True)
 class Reset(Request["ResetSuccess"], id=0x230D):
+    """Reset a device by its number, or all with 0 [API 3.3.29] (D-API-12)."""
+
     number: U8
 
 
@@ -392,7 +286,7 @@ class ResetFailure(Message, id=0x230F):
 
 @dataclass(frozen=True)
 class GetArbitratorInfo(Request["ArbitratorInfoSuccess"], id=0x2401, reads=True):
-    pass
+    """What the arbitrator is, and what it is doing (D-API-5)."""
 
 
 @dataclass(frozen=True)
@@ -416,6 +310,8 @@ class ArbitratorInfoFailure(Failure, id=0x2403):
 
 @dataclass(frozen=True)
 class SetFlags(Request["SetFlagsSuccess"], id=0x2404):
+    """Set the flags (D-API-5, D-API-13)."""
+
     flags: U8
 
 
@@ -430,6 +326,8 @@ class SetFlagsFailure(Failure, id=0x2406):
 
 @dataclass(frozen=True)
 class ProfileAction(Request["ProfileActionSuccess"], id=0x2407):
+    """Have the profile layer do something; the result is how many links were made or removed (D-API-5, D-API-13)."""
+
     action: U8
     argument: U8
 
@@ -445,6 +343,8 @@ class ProfileActionFailure(Failure, id=0x2409):
 
 @dataclass(frozen=True)
 class ReadConfigurations(Request["ReadConfigurationsSuccess"], id=0x240A, reads=True):
+    """Read a piece of the stored configurations, up to 128 bytes (D-API-5, D-API-15)."""
+
     offset: U16
     length: U8
 
@@ -462,9 +362,11 @@ class ReadConfigurationsFailure(Failure, id=0x240C):
 
 @dataclass(frozen=True)
 class WriteConfigurations(Request["WriteConfigurationsSuccess"], id=0x240D):
+    """Write the stored configurations piece by piece (D-API-5, D-API-15)."""
+
     offset: U16
     total: U16
-    data: Rest
+    data: Value
 
 
 @dataclass(frozen=True)
@@ -478,6 +380,8 @@ class WriteConfigurationsFailure(Failure, id=0x240F):
 
 @dataclass(frozen=True)
 class RemoveLink(Request["RemoveLinkSuccess"], id=0x2410):
+    """Remove the link of an input (D-API-5, D-API-13)."""
+
     input: Chan
 
 
@@ -492,6 +396,8 @@ class RemoveLinkFailure(Failure, id=0x2412):
 
 @dataclass(frozen=True)
 class GetStatistics(Request["StatisticsSuccess"], id=0x2413, reads=True):
+    """A group of counters (D-API-5)."""
+
     group: U8
 
 
@@ -507,6 +413,8 @@ class StatisticsFailure(Failure, id=0x2415):
 
 @dataclass(frozen=True)
 class StreamEvents(Request["StreamEventsSuccess"], id=0x2416):
+    """Ask for events of these kinds, 0 for none (D-API-5, D-API-20)."""
+
     mask: Mask
 
 
@@ -521,6 +429,8 @@ class StreamEventsFailure(Failure, id=0x2418):
 
 @dataclass(frozen=True)
 class EventMessage(Message, id=0x2419):
+    """An event that was asked for with 2416h; its reference is 0 (D-API-5)."""
+
     kind: U8
     time_ms: U32
     data: Rest

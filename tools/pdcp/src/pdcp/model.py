@@ -1,8 +1,32 @@
 """What a limb and its arbitrator consist of, as the host sees them. Plain values: nothing here talks to anybody."""
 
 from dataclasses import dataclass
-from enum import IntEnum, IntFlag, StrEnum
+from enum import StrEnum
 from typing import NamedTuple, Self
+
+from .protocol import Action, Flags, LinkStatus, ProfileState
+
+__all__ = [
+    "BROADCAST",
+    "UINT8_MAX",
+    "UINT16_MAX",
+    "Action",
+    "ArbitratorInfo",
+    "Channel",
+    "ChannelId",
+    "Counter",
+    "Device",
+    "Direction",
+    "Flags",
+    "Identity",
+    "Limits",
+    "Link",
+    "LinkStatus",
+    "ProfileState",
+    "Stats",
+    "SystemInfo",
+    "parse_number",
+]
 
 UINT16_MAX = 0xFFFF
 UINT8_MAX = 0xFF
@@ -70,14 +94,6 @@ class Direction(StrEnum):
     OUTPUT = "output"
 
 
-class LinkStatus(IntEnum):
-    """D-BUS-10; 0 only in events."""
-
-    GONE = 0
-    INACTIVE = 1  # one end is missing
-    ACTIVE = 2
-
-
 class SystemInfo(NamedTuple):
     """How many there are (2202h). Links count whether they are active or not."""
 
@@ -122,24 +138,6 @@ class Link:
     status: LinkStatus
 
 
-class ProfileState(IntEnum):
-    """What the profile layer is doing."""
-
-    WAITING = 0
-    CONFIGURING = 1
-    RUNNING = 2
-
-
-class Flags(IntFlag):
-    """Settings of the arbitrator (2401h, 2404h)."""
-
-    AUTOCONFIGURE = 0x01
-    HOT_SWAP = 0x02
-    AUTO_SAVE = 0x04
-    STRICT_CRC = 0x08
-    EVENT_STREAM = 0x10  # read only
-
-
 @dataclass(frozen=True, slots=True)
 class Limits:
     """Sizes of the arbitrator's tables."""
@@ -164,19 +162,6 @@ class ArbitratorInfo:
     @property
     def firmware_text(self) -> str:
         return ".".join(str(part) for part in self.firmware)
-
-
-class Action(IntEnum):
-    """Of the profile layer (2407h)."""
-
-    SAVE = 1
-    LOAD = 2
-    ERASE = 3
-    AUTOCONFIGURE = 4
-    CLEAR = 5
-    ENFORCE = 6
-    REPLACE = 7
-    ADOPT = 8
 
 
 @dataclass(frozen=True, slots=True)

@@ -29,10 +29,10 @@ from .model import (
     Stats,
     SystemInfo,
 )
+from .protocol import FunctionCode, Response
 
 PIECE = 128  # bytes of stored configurations in one message (240Ah)
 CAN_DATA_MAX = 8
-SUSPEND, RELEASE = 0x08, 0x09  # function codes [PDCP 3.2.4, 3.2.5]
 NUMBERS = range(1, 256)
 
 T = TypeVar("T")
@@ -118,18 +118,18 @@ def _command(identity: Identity | None, data: bytes) -> Operation[None]:
     """Suspend or release, whose answer says after its function code whether the device did it."""
     answer = yield from passthrough(identity or BROADCAST, data)
     # An answer too short to hold its response code means success (D-BUS-18).
-    if identity is not None and len(answer) > 1 and answer[1] != 1:
+    if identity is not None and len(answer) > 1 and answer[1] != Response.SUCCESS:
         raise RequestError(m.Passthrough.ID, ErrorCode.DEVICE_REFUSED)
 
 
 def suspend(identity: Identity | None, time_ms: int) -> Operation[None]:
     if not 0 <= time_ms <= UINT16_MAX:
         raise m.FormatError(f"a device cannot be suspended for {time_ms} ms, only for 0 to {UINT16_MAX}")
-    return _command(identity, bytes([SUSPEND]) + time_ms.to_bytes(2, "little"))
+    return _command(identity, bytes([FunctionCode.SUSPEND]) + time_ms.to_bytes(2, "little"))
 
 
 def release(identity: Identity | None) -> Operation[None]:
-    return _command(identity, bytes([RELEASE]))
+    return _command(identity, bytes([FunctionCode.RELEASE]))
 
 
 def reset(identity: Identity | None) -> Operation[None]:

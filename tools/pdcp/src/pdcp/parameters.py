@@ -5,14 +5,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
+from . import protocol
 from .model import Direction, parse_number
 from .profiles import describe_type, parse_profile, profile_name
 
 BITS_MAX = 32 * 8  # channels that a required or desired string can name (D-BUS-8)
-NO_CHANNEL = 0xFF  # index in the source of an input that is not connected (D-BUS-7)
-
-# Values of an input's parameters 5 to 8 when it is not connected (D-BUS-7).
-_NO_SOURCE = {5: [0xFFFF, 0xFFFF], 6: [0xFFFF, NO_CHANNEL], 7: [0, 0], 8: [0, 0]}
 
 
 class Kind(StrEnum):
@@ -44,7 +41,7 @@ class Form(StrEnum):
     CHANNELS = "channels"  # bit string; most significant bit of the first byte: channel 0 (D-BUS-8)
 
 
-TRANSFER_KINDS = {1: Kind.INPUT, 2: Kind.OUTPUT}
+TRANSFER_KINDS = {number: Kind(name) for number, name in protocol.TEXTS["transfer"].items()}
 _SWITCHES = {0: "off", 1: "on"}
 
 FieldValue = int | str | bool
@@ -103,11 +100,6 @@ class Field:
         return number.to_bytes(self.size, "little")
 
 
-_VENDOR = (Field("vid", 2), Field("pid", 2))
-_NODES = (Field("device_node", 1, Style.NODE), Field("output_node", 1, Style.NODE))
-_CHANNEL_TYPE = (Field("type", 2, Style.TYPE), Field("profile", 2, Style.PROFILE))
-
-
 @dataclass(frozen=True)
 class Parameter:
     """One parameter of a kind of things."""
@@ -142,7 +134,7 @@ class Parameter:
 
     def is_no_source(self, value: bytes) -> bool:
         """Does it say of an input that it is not connected?"""
-        return self.kind is Kind.INPUT and _NO_SOURCE.get(self.number) == self.numbers(value)
+        return self.kind is Kind.INPUT and protocol.NO_SOURCE.get(self.number) == tuple(self.numbers(value))
 
     def show(self, value: bytes) -> str:
         """A value as people read it: one line, without control characters."""
@@ -155,7 +147,7 @@ class Parameter:
         shown = [field.show(number) for field, number in zip(self.fields, self.numbers(value), strict=True)]
         if len(shown) == 1:
             return shown[0]
-        if self.fields == _CHANNEL_TYPE:
+        if self.fields[0].style is Style.TYPE:
             return "; ".join(shown)
         return ", ".join(f"{field.label} {text}" for field, text in zip(self.fields, shown, strict=True))
 
@@ -193,60 +185,14 @@ def bits_of(channels: Sequence[int]) -> bytes:
     return bytes(bits)
 
 
-def _one(name: str, size: int, style: Style = Style.NUMBER) -> tuple[Field, ...]:
-    return (Field(name, size, style),)
+def _parameter(kind: str, number: int, name: str, fields: tuple[tuple[str, int, str], ...], form: str) -> Parameter:
+    made = tuple(Field(part, size, Style(style)) for part, size, style in fields)
+    return Parameter(Kind(kind), number, name, made, Form(form))
 
 
-DEVICE_PARAMETERS = (
-    Parameter(Kind.DEVICE, 1, "vid-pid", _VENDOR),
-    Parameter(Kind.DEVICE, 2, "serial-number", _one("sn", 2)),
-    Parameter(Kind.DEVICE, 3, "ean13-low", _one("ean13_low", 4)),
-    Parameter(Kind.DEVICE, 4, "ean13-high", _one("ean13_high", 4)),
-    Parameter(Kind.DEVICE, 5, "version", (Field("firmware", 2), Field("hardware", 2))),
-    Parameter(Kind.DEVICE, 6, "type", (Field("type", 2, Style.WORD), Field("profile", 2, Style.WORD))),
-    Parameter(Kind.DEVICE, 7, "descriptor", form=Form.TEXT),
-    Parameter(Kind.DEVICE, 8, "node-id", _one("node_id", 1, Style.NODE)),
-    Parameter(Kind.DEVICE, 9, "channels", _one("channels", 1)),
-    Parameter(Kind.DEVICE, 10, "beacon-interval", _one("beacon_interval", 2, Style.MILLISECONDS)),
-    Parameter(Kind.DEVICE, 11, "ack-time", _one("ack_time", 2, Style.MILLISECONDS)),
-    Parameter(Kind.DEVICE, 12, "bind-timeout", _one("bind_timeout", 2, Style.MILLISECONDS)),
-)
-
-
-def _of_channel(kind: Kind) -> tuple[Parameter, ...]:
-    return (
-        Parameter(kind, 1, "type", _CHANNEL_TYPE),
-        Parameter(kind, 2, "descriptor", form=Form.TEXT),
-        Parameter(kind, 3, "transfer-type", _one("transfer_type", 1, Style.TRANSFER)),
-        Parameter(kind, 4, "enabled", _one("enabled", 1, Style.SWITCH)),
-    )
-
-
-def _needs(kind: Kind) -> tuple[Parameter, ...]:
-    return (
-        Parameter(kind, 9, "required", form=Form.CHANNELS),
-        Parameter(kind, 10, "desired", form=Form.CHANNELS),
-    )
-
-
-INPUT_PARAMETERS = (
-    *_of_channel(Kind.INPUT),
-    Parameter(Kind.INPUT, 5, "source-device", _VENDOR),
-    Parameter(Kind.INPUT, 6, "source-channel", (Field("sn", 2), Field("index", 1))),
-    Parameter(Kind.INPUT, 7, "source-nodes", _NODES),
-    Parameter(Kind.INPUT, 8, "source-type", _CHANNEL_TYPE),
-    *_needs(Kind.INPUT),
-    Parameter(Kind.INPUT, 11, "terminal-profile", _one("terminal_profile", 2, Style.PROFILE)),
-)
-
-OUTPUT_PARAMETERS = (
-    *_of_channel(Kind.OUTPUT),
-    Parameter(Kind.OUTPUT, 5, "node-id", _one("node_id", 1, Style.NODE)),
-    *_needs(Kind.OUTPUT),
-)
-
-PARAMETERS = {Kind.DEVICE: DEVICE_PARAMETERS, Kind.INPUT: INPUT_PARAMETERS, Kind.OUTPUT: OUTPUT_PARAMETERS}
-_BY_NUMBER = {(each.kind, each.number): each for rows in PARAMETERS.values() for each in rows}
+_ROWS = tuple(_parameter(*row) for row in protocol.PARAMETERS)
+PARAMETERS = {kind: tuple(each for each in _ROWS if each.kind is kind) for kind in Kind}
+_BY_NUMBER = {(each.kind, each.number): each for each in _ROWS}
 
 TRANSFER_TYPE = 3  # parameter of a channel that says which kind it is
 

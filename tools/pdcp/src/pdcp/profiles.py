@@ -5,25 +5,18 @@ from __future__ import annotations
 import difflib
 import functools
 import re
-import tomllib
 from dataclasses import dataclass
-from importlib import resources
+
+from .profile_tree import PROFILES
+from .protocol import TEXTS, TypeData, TypeSize
 
 __all__ = ["Profile", "channel_value", "describe_type", "parse_profile", "profile_name", "profile_path", "profiles"]
 
 _HEX_WORD = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})|([0-9A-Fa-f]{4})[hH]?|([0-9A-Fa-f]{1,4})[hH]")
 
-_SIZES = ("4 bits", "8 bits", "12 bits", "16 bits")
-_DATA = ("signed", "unsigned", "float", "boolean")
-_CONTROL = ("position", "velocity", "acceleration", "other")
-_PRESCALERS = ("", "x10^-6", "x10^-3", "x10^-1", "x10", "x10^2", "x10^3", "x10^6")
-_SIGNED, _FLOAT, _BOOLEAN = 0, 2, 3
-_BITS_16 = 3
-
-
 @dataclass(frozen=True, slots=True)
 class Profile:
-    """A node of the tree. What the file leaves out is that of the parent."""
+    """A node of the tree."""
 
     word: int
     path: str
@@ -36,29 +29,10 @@ class Profile:
     safe: str
 
 
-def _parent(word: int) -> int:
-    """The word without its last component that is not 0; 0 for a root."""
-    for mask in (0xFFF0, 0xFF00, 0xF000):
-        if word & ~mask & 0xFFFF:
-            return word & mask
-    return 0
-
-
 @functools.cache
 def profiles() -> dict[int, Profile]:
     """All nodes of the tree by their word, lowest first."""
-    text = resources.files("pdcp").joinpath("data/profiles.toml").read_text(encoding="utf-8")
-    rows: dict[str, dict[str, str]] = tomllib.loads(text)
-    tree: dict[int, Profile] = {}
-    for number, row in sorted(rows.items()):
-        word = int(number, 16)
-        inherited = tree.get(_parent(word))
-        values = {
-            key: row.get(key) or (getattr(inherited, key) if inherited else "")
-            for key in ("scale", "mode", "sign", "rate", "safe")
-        }
-        tree[word] = Profile(word, row["path"], row["name"], row["means"], **values)
-    return tree
+    return {row[0]: Profile(*row) for row in PROFILES}
 
 
 def _named(word: int) -> Profile | None:
@@ -105,11 +79,12 @@ def describe_type(word: int) -> str:
     """A channel type in words: `8 bits, unsigned, position, sole access, terminal`. What it must not be is marked."""
     size = word >> 14 & 3
     data = word >> 12 & 3
-    words = [_SIZES[size], _DATA[data], _CONTROL[word >> 10 & 3]]
+    prescaler = word >> 5 & 7
+    words = [TEXTS["type_size"][size], TEXTS["type_data"][data], TEXTS["type_control"][word >> 10 & 3]]
     words += ["sole access"] if word & 0x0200 else []
     words += ["terminal"] if word & 0x0100 else []
-    words += [_PRESCALERS[word >> 5 & 7]] if word >> 5 & 7 else []
-    if data == _FLOAT and size != _BITS_16:
+    words += [TEXTS["type_prescaler"][prescaler]] if prescaler else []
+    if data == TypeData.FLOAT and size != TypeSize.BITS_16:
         words.append("not allowed: float needs 16 bits")
     if word & 0x1F:
         words.append(f"unused bits {word & 0x1F:02X}h")
@@ -121,9 +96,9 @@ def channel_value(word: int, data: bytes) -> int | bool | None:
     bits = 4 * ((word >> 14 & 3) + 1)
     kind = word >> 12 & 3
     number = int.from_bytes(data[: 1 if bits <= 8 else 2], "little") & ((1 << bits) - 1)
-    if not data or kind == _FLOAT:
+    if not data or kind == TypeData.FLOAT:
         return None
-    if kind == _BOOLEAN:
+    if kind == TypeData.BOOLEAN:
         return bool(number)
-    is_negative = kind == _SIGNED and number >> (bits - 1)
+    is_negative = kind == TypeData.SIGNED and number >> (bits - 1)
     return number - (1 << bits) if is_negative else number

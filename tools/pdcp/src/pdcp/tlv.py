@@ -14,41 +14,47 @@ from dataclasses import dataclass, field
 import yaml
 
 from .profiles import describe_type, profile_name
+from .protocol import ConfigurationCode as Code
 
 __all__ = ["Channel", "Configuration", "Link", "TlvError", "from_yaml", "parse", "to_yaml"]
 
 ENTRY_BYTES = 3
 _NUMBER_MAX = 255  # of configurations, links and channels
 
-CONFIGURATIONS, CONFIGURATION, LINKS, LINK, INPUT, OUTPUT = 1, 2, 3, 4, 5, 6
-CHANNEL_TYPE, CHANNEL_PROFILE, CHANNEL_INDEX, OWNER_VID, OWNER_PID, OWNER_SN = 7, 8, 9, 10, 11, 12
-OWNER_TYPE, OWNER_PROFILE, END = 13, 14, 15
-
-_VALUES = {
-    CHANNEL_TYPE: "type",
-    CHANNEL_PROFILE: "profile",
-    CHANNEL_INDEX: "index",
-    OWNER_VID: "vid",
-    OWNER_PID: "pid",
-    OWNER_SN: "serial",
-    OWNER_TYPE: "device_type",
-    OWNER_PROFILE: "device_profile",
+_VALUES: dict[int, str] = {
+    Code.CHANNEL_TYPE: "type",
+    Code.CHANNEL_PROFILE: "profile",
+    Code.CHANNEL_INDEX: "index",
+    Code.OWNER_VID: "vid",
+    Code.OWNER_PID: "pid",
+    Code.OWNER_SN: "serial",
+    Code.OWNER_TYPE: "device_type",
+    Code.OWNER_PROFILE: "device_profile",
 }
-_NAMES = {
-    CONFIGURATIONS: "number_of_configurations",
-    CONFIGURATION: "configuration",
-    LINKS: "number_of_links",
-    LINK: "link",
-    INPUT: "input",
-    OUTPUT: "output",
-    END: "end",
-    **{code: f"channel_{name}" if code <= CHANNEL_INDEX else f"owner_{name}" for code, name in _VALUES.items()},
+_NAMES: dict[int, str] = {
+    Code.CONFIGURATIONS: "number_of_configurations",
+    Code.CONFIGURATION: "configuration",
+    Code.LINKS: "number_of_links",
+    Code.LINK: "link",
+    Code.INPUT: "input",
+    Code.OUTPUT: "output",
+    Code.END: "end",
+    **{code: f"channel_{name}" if code <= Code.CHANNEL_INDEX else f"owner_{name}" for code, name in _VALUES.items()},
 }
-_NAMES[OWNER_TYPE], _NAMES[OWNER_PROFILE] = "owner_type", "owner_profile"
+_NAMES[Code.OWNER_TYPE], _NAMES[Code.OWNER_PROFILE] = "owner_type", "owner_profile"
 _CODES = {name: code for code, name in _NAMES.items()}
 _VALUE_CODES = {name: code for code, name in _VALUES.items()}
 _CODE_KEY = re.compile(r"code_(\d{1,3})")
-_DECIMAL = {CHANNEL_INDEX, CONFIGURATIONS, CONFIGURATION, LINKS, LINK, OWNER_VID, OWNER_PID, OWNER_SN}
+_DECIMAL = {
+    Code.CHANNEL_INDEX,
+    Code.CONFIGURATIONS,
+    Code.CONFIGURATION,
+    Code.LINKS,
+    Code.LINK,
+    Code.OWNER_VID,
+    Code.OWNER_PID,
+    Code.OWNER_SN,
+}
 
 
 class TlvError(ValueError):
@@ -112,19 +118,19 @@ class _Reader:
             raise TlvError(f"byte {at}: {error}") from None
 
     def _take(self, code: int, value: int) -> None:
-        if code == CONFIGURATIONS:
+        if code == Code.CONFIGURATIONS:
             self._count(value)
-        elif code == CONFIGURATION:
+        elif code == Code.CONFIGURATION:
             self._open_configuration(value)
-        elif code == LINKS:
+        elif code == Code.LINKS:
             self._count_links(value)
-        elif code == LINK:
+        elif code == Code.LINK:
             self._open_link(value)
-        elif code in (INPUT, OUTPUT):
+        elif code in (Code.INPUT, Code.OUTPUT):
             self._open_channel(code)
         elif self.channel is None:
             raise TlvError(f"{_NAMES[code]} belongs to no channel")
-        elif code == CHANNEL_INDEX and value > _NUMBER_MAX:
+        elif code == Code.CHANNEL_INDEX and value > _NUMBER_MAX:
             raise TlvError(f"channel index {value} is above {_NUMBER_MAX}")
         else:
             setattr(self.channel, _VALUES[code], value)
@@ -182,7 +188,7 @@ class _Reader:
         if code in self.ends:
             raise TlvError(f"link {link.index} has two {_NAMES[code]}s")
         self.ends.add(code)
-        self.channel = link.input if code == INPUT else link.output
+        self.channel = link.input if code == Code.INPUT else link.output
 
     def end(self) -> list[Configuration]:
         """All configurations, when the end was read."""
@@ -201,10 +207,10 @@ def parse(data: bytes) -> list[Configuration]:
     out of range, an entry outside of what it belongs to."""
     reader = _Reader()
     for at, code, value in _entries(data):
-        if code == END:
+        if code == Code.END:
             return reader.end()
         reader.entry(at, code, value)
-    raise TlvError(f"no end (code {END}) in {len(data)} bytes")
+    raise TlvError(f"no end (code {Code.END}) in {len(data)} bytes")
 
 
 # --- to YAML --------------------------------------------------------------------------------------
@@ -215,9 +221,9 @@ def _number(code: int, value: int) -> str:
 
 
 def _comment(code: int, value: int) -> str:
-    if code == CHANNEL_TYPE:
+    if code == Code.CHANNEL_TYPE:
         return f"  # {describe_type(value)}"
-    if code in (CHANNEL_PROFILE, OWNER_PROFILE) and profile_name(value):
+    if code in (Code.CHANNEL_PROFILE, Code.OWNER_PROFILE) and profile_name(value):
         return f"  # {profile_name(value)}"
     return ""
 
@@ -239,10 +245,10 @@ class _Tree:
 
     def write(self) -> str:
         """The text; what it says may be less than the string holds, which the caller checks."""
-        if self._is(CONFIGURATIONS):
+        if self._is(Code.CONFIGURATIONS):
             self._take()
         start = len(self.lines)
-        while self._is(CONFIGURATION):
+        while self._is(Code.CONFIGURATION):
             self._configuration(self._take()[1])
         if len(self.lines) == start:
             self.lines = ["configurations: []"]
@@ -250,17 +256,17 @@ class _Tree:
 
     def _configuration(self, index: int) -> None:
         self.lines.append(f"- configuration: {index}")
-        if self._is(LINKS):
+        if self._is(Code.LINKS):
             self._take()
         self._others("  ")
-        if not self._is(LINK):
+        if not self._is(Code.LINK):
             self.lines.append("  links: []")
             return
         self.lines.append("  links:")
-        while self._is(LINK):
+        while self._is(Code.LINK):
             self.lines.append(f"  - link: {self._take()[1]}")
             self._others("    ")
-            while self._is(INPUT) or self._is(OUTPUT):
+            while self._is(Code.INPUT) or self._is(Code.OUTPUT):
                 self._channel(_NAMES[self._take()[0]])
 
     def _others(self, indent: str) -> None:
@@ -366,7 +372,7 @@ def _link_bytes(node: yaml.Node) -> bytes:
     items = _items(node, "a link")
     if not items or items[0][0] != "link":
         raise _fail(node, "a link must begin with link, its index")
-    out = _pack(LINK, _word(items[0][2], "link"))
+    out = _pack(Code.LINK, _word(items[0][2], "link"))
     for name, key, value in items[1:]:
         if name in ("input", "output"):
             out += _channel_bytes(_CODES[name], value)
@@ -382,7 +388,7 @@ def _configuration_bytes(node: yaml.Node) -> bytes:
     if items[-1][0] != "links":
         raise _fail(node, "a configuration must end with links")
     links = _list(items[-1][2], "links")
-    out = _pack(CONFIGURATION, _word(items[0][2], "configuration")) + _pack(LINKS, len(links))
+    out = _pack(Code.CONFIGURATION, _word(items[0][2], "configuration")) + _pack(Code.LINKS, len(links))
     for name, key, value in items[1:-1]:
         out += _other(name, key, value, "links")
     return out + b"".join(_link_bytes(link) for link in links)
@@ -426,7 +432,7 @@ def from_yaml(text: str) -> bytes:
     if names == ["configurations"]:
         configurations = _list(items[0][2], "configurations")
         body = b"".join(_configuration_bytes(each) for each in configurations)
-        return _pack(CONFIGURATIONS, len(configurations)) + body + _pack(END, 0)
+        return _pack(Code.CONFIGURATIONS, len(configurations)) + body + _pack(Code.END, 0)
     if names in (["entries"], ["entries", "rest"]):
         out = b"".join(_entry_bytes(each) for each in _list(items[0][2], "entries"))
         return out + (_rest_bytes(items[1][2]) if len(items) == 2 else b"")

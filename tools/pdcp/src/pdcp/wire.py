@@ -9,11 +9,11 @@ import binascii
 import struct
 from typing import NamedTuple
 
-SYNC = b"\xfe\x19"
-HEADER_SIZE = 8
-CRC16_SIZE = 2
-VALUE_MAX = 512  # bytes of a parameter (D-BUS-13): the longest answer
-PAYLOAD_MAX = VALUE_MAX + 8  # the longest request sets such a value
+from .protocol import CRC16_SIZE, HEADER_SIZE, PAYLOAD_MAX, SYNC1, SYNC2
+
+__all__ = ["CRC16_SIZE", "HEADER_SIZE", "PAYLOAD_MAX", "SYNC", "Frame", "Receiver", "crc16", "crc8", "encode"]
+
+SYNC = bytes((SYNC1, SYNC2))
 SILENCE_S = 0.1  # inside a message: it is given up (D-API-2)
 
 

@@ -343,6 +343,15 @@ def field_rows(table: Table) -> Iterator[tuple[object, ...]]:
                 at += part.least
 
 
+def unconnected_rows(table: Table) -> Iterator[tuple[object, ...]]:
+    for parameter in (each for each in built(table.parameters) if each.unconnected):
+        value = b"".join(
+            number.to_bytes(part.least, "little")
+            for part, number in zip(parameter.fields, parameter.unconnected, strict=True)
+        )
+        yield from ((parameter.number, place, f"0x{byte:02X}") for place, byte in enumerate(value))
+
+
 def open_size(layout: Sequence[Field]) -> tuple[int, int]:
     least, most = sizes_of(layout)
     return least, 0xFFFF if most is None else most
@@ -376,25 +385,18 @@ def header(table: Table) -> Iterator[str]:
     )
     yield from macro(
         "PROTOCOL_PARAMETERS",
-        "0 device, 1 input, 2 output; number; bytes or 0: any; is it written; does a setup need it",
-        (
-            (kind, each.number, sizes_of(each.fields)[0], int(each.access != "read"), int(each.mandatory))
-            for kind, each in parameters
-        ),
+        "0 device, 1 input, 2 output; number; bytes or 0: any; is it written",
+        ((kind, each.number, sizes_of(each.fields)[0], int(each.access != "read")) for kind, each in parameters),
     )
-    yield from macro(
-        "PROTOCOL_UNCONNECTED",
-        "parameter of an input, number of a field, its value",
-        (
-            (each.number, place, f"0x{value:X}")
-            for each in built(table.parameters)
-            for place, value in enumerate(each.unconnected)
-        ),
-    )
+    yield from macro("PROTOCOL_UNCONNECTED", "parameter of an input, place in its value, byte", unconnected_rows(table))
     yield from macro(
         "PROTOCOL_MESSAGES",
-        "id; bytes of a request's payload, least and most",
-        ((f"0x{each.number:04X}", *open_size(each.request)) for each in built(table.messages) if each.sender == "host"),
+        "id; bytes of a request's payload, least and most; the same of its success answer",
+        (
+            (f"0x{each.number:04X}", *open_size(each.request), *open_size(each.success))
+            for each in built(table.messages)
+            if each.sender == "host"
+        ),
     )
     yield from macro(
         "PROTOCOL_EVENTS",

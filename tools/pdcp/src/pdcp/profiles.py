@@ -14,6 +14,7 @@ __all__ = ["Profile", "channel_value", "describe_type", "parse_profile", "profil
 
 _HEX_WORD = re.compile(r"0[xX]([0-9A-Fa-f]{1,4})|([0-9A-Fa-f]{4})[hH]?|([0-9A-Fa-f]{1,4})[hH]")
 
+
 @dataclass(frozen=True, slots=True)
 class Profile:
     """A node of the tree."""

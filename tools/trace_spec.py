@@ -217,8 +217,10 @@ def files_of(root: Path, folders: tuple[str, ...]) -> Iterator[Path]:
 
 
 def documents_of(root: Path) -> Iterator[Path]:
-    """Markdown files: what they cite must exist, but they are neither code nor tests."""
+    """Markdown files, and the tables of the specification: what they cite must exist, but they are neither code nor
+    tests."""
     yield from sorted(root.glob("*.md"))
+    yield from sorted((root / SPEC).glob("*.toml"))
     for folder in ("docs", *CODE_FOLDERS, *TEST_FOLDERS):
         for path in sorted((root / folder).rglob("*.md")):
             if not is_hidden(path, root):

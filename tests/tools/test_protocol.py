@@ -5,7 +5,6 @@ import re
 import shutil
 import subprocess
 import sys
-import tomllib
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,7 +13,6 @@ from pdcp.events import UnknownEvent, parse
 from pdcp.messages import MESSAGES, EventMessage, FormatError
 from protocol_table import PLACE, Field, Table, TableError, built, load, sizes_of
 from protocol_table import parse as parse_table
-from trace_spec import find_clauses, find_decisions
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tools/gen_protocol.py"
@@ -78,34 +76,6 @@ def test_constants_of_a_header_are_seen() -> None:
 
 
 # --- what the table says --------------------------------------------------------------------------
-
-
-def cites() -> Iterator[str]:
-    """What is cited for what is built."""
-    known = table()
-    for numbers in built(known.sets):
-        yield numbers.cite
-        yield from (value.cite for value in built(numbers.values))
-    yield from (function.cite for function in known.functions)
-    yield from (codes.cite for codes in known.ranges)
-    yield from (parameter.cite for parameter in built(known.parameters))
-    yield from (message.cite for message in built(known.messages))
-    yield from (event.cite for event in built(known.events))
-    yield from (group.cite for group in known.counters)
-
-
-def test_what_is_cited_exists() -> None:
-    text = "\n".join(cites())
-    sources = tomllib.loads((ROOT / "docs/clauses.toml").read_text(encoding="utf-8"))["sources"]
-    clauses = {f"{source} {kind}": numbers for source, kinds in sources.items() for kind, numbers in kinds.items()}
-    cited = {name for name, _ in find_clauses(text, clauses)}
-    assert len(cited) > 20
-    assert cited <= {f"{kind} {number}" for kind, numbers in clauses.items() for number in numbers}
-    documents = [*(ROOT / "docs").glob("*.*"), *(ROOT / "docs/spec").glob("*.md")]
-    told = {name for path in documents for name, _ in find_decisions(path.read_text(encoding="utf-8"), True)}
-    named = {name for name, _ in find_decisions(text, True)}
-    assert len(named) > 20
-    assert named <= told
 
 
 def test_only_what_is_built_is_a_message_of_the_package() -> None:

@@ -163,7 +163,10 @@ def test_tests_of_tools_do_not_count(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "path",
-    ["pdcp/b.c", "tests/sim/b.c", "tools/script", "tests/vectors/b.log", "docs/b.md", "CHANGELOG.md", "tools/b/c.md"],
+    [
+        *("pdcp/b.c", "tests/sim/b.c", "tools/script", "tests/vectors/b.log", "docs/b.md", "docs/spec/b.toml"),
+        *("CHANGELOG.md", "tools/b/c.md"),
+    ],
 )
 def test_a_decision_that_does_not_exist_is_found(tmp_path: Path, path: str) -> None:
     output = findings(tmp_path, {path: f"#\n# {d('BUS', 2)} and\n# -5, {d('SIM', 1)}\n"})

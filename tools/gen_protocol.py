@@ -10,6 +10,7 @@ Exit status: 0 done or up to date, 1 not up to date, 2 the table is not sound or
 
 import argparse
 import json
+import re
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import fields
@@ -83,11 +84,14 @@ def assign(target: str, value: object, indent: str = "", end: str = "") -> Itera
 
 def cited(text: str, cite: str) -> str:
     """A text with what it cites, decisions in brackets."""
-    clauses: list[str] = []
-    decisions: list[str] = []
-    for part in cite.replace("], ", "]|").replace(", D-", "|D-").split("|") if cite else ():
-        (clauses if part.startswith("[") else decisions).append(part)
-    return " ".join([text, *clauses, *([f"({', '.join(decisions)})"] if decisions else [])])
+    clauses = re.findall(r"\[[^]]*\]", cite)
+    decisions = ", ".join(re.findall(r"D-[A-Z]+-\d+", cite))
+    return " ".join([text, *clauses, *([f"({decisions})"] if decisions else [])])
+
+
+def member(name: str, number: int, text: str) -> str:
+    """A member of an enumeration, with its text where that says more."""
+    return f"    {name} = {number!r}" + ("" if text == name.lower().replace("_", " ") else f"  # {text}")
 
 
 def enumeration(numbers: NumberSet) -> Iterator[str]:
@@ -97,8 +101,7 @@ def enumeration(numbers: NumberSet) -> Iterator[str]:
     yield ""
     for value in values:
         number = Hex(value.number) if numbers.flags or numbers.id == "error" else value.number
-        says_more = value.text != value.client.lower().replace("_", " ")
-        yield f"    {value.client} = {number!r}" + (f"  # {value.text}" if says_more else "")
+        yield member(value.client, number, value.text)
 
 
 def function_codes(functions: Sequence[Function]) -> Iterator[str]:
@@ -114,7 +117,7 @@ def event_kinds(table: Table) -> Iterator[str]:
     yield '    """Kinds of events; bit kind - 1 of the mask asks for one (2416h, 2419h)."""'
     yield ""
     for event in built(table.events):
-        yield f"    {event.client} = {event.number}  # {event.text}"
+        yield member(event.client, event.number, event.text)
     yield ""
     yield "    @property"
     yield "    def mask(self) -> int:"
@@ -385,8 +388,11 @@ def header(table: Table) -> Iterator[str]:
     )
     yield from macro(
         "PROTOCOL_PARAMETERS",
-        "0 device, 1 input, 2 output; number; bytes or 0: any; is it written",
-        ((kind, each.number, sizes_of(each.fields)[0], int(each.access != "read")) for kind, each in parameters),
+        "0 device, 1 input, 2 output; number; bytes or 0: any; is it written; does a setup fail without it",
+        (
+            (kind, each.number, sizes_of(each.fields)[0], int(each.access != "read"), int(each.mandatory))
+            for kind, each in parameters
+        ),
     )
     yield from macro("PROTOCOL_UNCONNECTED", "parameter of an input, place in its value, byte", unconnected_rows(table))
     yield from macro(

@@ -43,6 +43,7 @@ typedef struct {
     uint8_t number;
     uint8_t size; /* 0: any */
     bool written;
+    bool mandatory;
 } parameter_t;
 
 typedef struct {
@@ -64,7 +65,7 @@ static const function_t functions[] = {PROTOCOL_FUNCTIONS(FUNCTION)};
 #define FIELD(code, name, at, size) {name, code, at, size},
 static const field_t fields[] = {PROTOCOL_FIELDS(FIELD)};
 
-#define PARAMETER(of, number, size, written) {(of_t)(of), number, size, written},
+#define PARAMETER(of, number, size, written, mandatory) {(of_t)(of), number, size, written, mandatory},
 static const parameter_t parameters[] = {PROTOCOL_PARAMETERS(PARAMETER)};
 
 #define UNCONNECTED(number, at, byte) {number, at, byte},
@@ -305,6 +306,65 @@ static void test_an_input_without_a_source_says_so(void)
     }
 }
 
+/* What a device 0002:0003:0004 with an input 1 and an output 2 has in a parameter: its first byte. */
+static uint8_t value_of(uint8_t channel, uint8_t param)
+{
+    if (channel == 0) {
+        return param == PDCP_DEV_SERIAL ? 4 : 2; /* 2: its VID, and how many channels it has */
+    }
+    return param == PDCP_CH_TRANSFER_TYPE ? channel : 0;
+}
+
+/* The answer of this device, which refuses one parameter of what stands at channel. */
+static void answer(const can_frame_t *request, const parameter_t *refused)
+{
+    const uint8_t code = request->data[0];
+    const uint8_t param = request->data[1];
+    const uint8_t channel = request->data[2];
+    const bool success = refused->of != (of_t)channel || refused->number != param;
+    can_frame_t frame = {.id = 0x211, .dlc = 8};
+    const uint8_t third = channel == 0 && param == PDCP_DEV_VID_PID ? 3 : 0;
+    const uint8_t data[8] = {code | PDCP_ANSWER,       success, param, channel,
+                             value_of(channel, param), 0,       third, 0};
+    memcpy(frame.data, data, sizeof data);
+    if (code == PDCP_SET_PARAMETER) {
+        memcpy(&frame.data[4], &request->data[3], 4);
+        frame.dlc = (uint8_t)(request->dlc + 1);
+    }
+    frame.dlc = success ? frame.dlc : 4;
+    arb_app_on_frame(&app, x.now_ms, &frame);
+}
+
+/* At once, without a second attempt. */
+static bool is_set_up_without(const parameter_t *refused)
+{
+    const can_frame_t asks = {.id = 0x611, .dlc = 7, .data = {PDCP_BIND_DEVICE, 2, 0, 3, 0, 4, 0}};
+    hostlink_start(&x, &app, false);
+    arb_app_on_frame(&app, x.now_ms, &asks);
+    for (int ms = 0; ms < 50; ms++) {
+        const can_frame_t *sent;
+        exchange_wait(&x, 1);
+        while ((sent = pdcp_arb_tx_peek(x.arb)) != NULL) {
+            const can_frame_t frame = *sent;
+            pdcp_arb_tx_pop(x.arb);
+            if (frame.id == 0x311 && frame.data[0] != (PDCP_BIND_DEVICE | PDCP_ANSWER)) {
+                answer(&frame, refused);
+            }
+        }
+    }
+    return x.arb->bus.nodes.nodes[0].state == PDCP_NODE_READY;
+}
+
+static void test_a_setup_needs_the_mandatory_parameters(void)
+{
+    static const parameter_t nothing = {.of = OF_DEVICE, .number = 0};
+    TEST_ASSERT_TRUE(is_set_up_without(&nothing));
+    for (size_t i = 0; i < COUNT(parameters); i++) {
+        TEST_ASSERT_EQUAL_MESSAGE(parameters[i].mandatory, !is_set_up_without(&parameters[i]),
+                                  say("parameter", parameters[i].number));
+    }
+}
+
 /* --- the host API --- */
 
 /* NULL: there is no such request. */
@@ -526,6 +586,7 @@ int main(void)
     RUN_TEST(test_a_device_takes_what_arbitrators_send);
     RUN_TEST(test_a_device_has_the_parameters_of_the_table);
     RUN_TEST(test_an_input_without_a_source_says_so);
+    RUN_TEST(test_a_setup_needs_the_mandatory_parameters);
     RUN_TEST(test_the_host_api_takes_the_sizes_of_the_table);
     RUN_TEST(test_the_host_api_has_no_other_messages);
     RUN_TEST(test_answers_from_the_tables_have_the_sizes_of_the_table);

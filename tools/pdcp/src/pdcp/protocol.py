@@ -7,7 +7,6 @@ VERSION = 1  # of the host API
 NODE_MAX = 254  # highest id; 255 is never given out (D-BUS-2)
 NO_CHANNEL = 255  # channel index
 VALUE_MAX = 512  # longest value that passes between host and device, bytes (D-BUS-13)
-ANSWER = 128  # answer
 SYNC1 = 254  # first byte
 SYNC2 = 25  # second byte
 HEADER_SIZE = 8  # bytes of a header
@@ -181,12 +180,12 @@ class FunctionCode(IntEnum):
 class EventKind(IntEnum):
     """Kinds of events; bit kind - 1 of the mask asks for one (2416h, 2419h)."""
 
-    DEVICE_BOUND = 1  # device bound
-    DEVICE_LOST = 2  # device lost
-    LINK_CHANGED = 3  # link changed
-    CONFIGURATION_CHANGED = 4  # configuration changed
+    DEVICE_BOUND = 1
+    DEVICE_LOST = 2
+    LINK_CHANGED = 3
+    CONFIGURATION_CHANGED = 4
     CAN_FRAME = 5  # CAN frame, of both directions
-    BUS_STATE = 6  # bus state
+    BUS_STATE = 6
     AUDIT = 9  # a channel does not have what the tables say
 
     @property

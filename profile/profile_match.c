@@ -84,3 +84,17 @@ uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input)
     return channel->link == PDCP_LINK_ACTIVE && profile_is_ready(nodes, input, PDCP_INPUT) ? channel->feed
                                                                                            : PDCP_NONE;
 }
+
+bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
+{
+    if (!profile_is_sole(&nodes->channels[input])) {
+        return false;
+    }
+    const pdcp_channel_t *channel = nodes->channels;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
+        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(channel)) {
+            return true;
+        }
+    }
+    return false;
+}

@@ -36,4 +36,7 @@ bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transf
 /* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
 uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input);
 
+/* Would the link give an output a second sole-access input, as the tables are? */
+bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
+
 #endif

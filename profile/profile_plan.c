@@ -69,19 +69,6 @@ static bool is_ready(const profile_plan_t *plan, uint8_t channel, uint8_t transf
     return profile_is_ready(plan->nodes, channel, transfer);
 }
 
-bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
-{
-    const uint8_t place = profile_links_place(scene->links, scene->nodes, end);
-    if (place == PDCP_NONE) {
-        return false;
-    }
-    const pdcp_node_t *node = &scene->nodes->nodes[place];
-    if (node->state == PDCP_NODE_LOST) {
-        return pdcp_bit(scene->awaited, place);
-    }
-    return node->state == PDCP_NODE_SETUP && !node->setup_again;
-}
-
 /* --- Ends of the configuration --- */
 
 /* The entry of an input, PDCP_NONE: it is nobody's. */
@@ -158,14 +145,9 @@ static void set_source(profile_plan_t *plan, uint8_t input, uint8_t output)
  * [PROFILE listing 4.4]. Both are set up. */
 static bool may_link(const profile_plan_t *plan, uint8_t output, uint8_t input)
 {
-    const profile_pair_t *banned = plan->scene->banned;
-    for (uint8_t i = plan->scene->banned_count; i > 0; i--, banned++) {
-        if (banned->output == output && banned->input == input) {
-            return false;
-        }
-    }
     const pdcp_channel_t *to = channel_of(plan, input);
-    if (profile_is_sole(to) && pdcp_bit(plan->taken, output)) {
+    if (profile_scene_is_banned(plan->scene, output, input) ||
+        (profile_is_sole(to) && pdcp_bit(plan->taken, output))) {
         return false;
     }
     return channel_of(plan, output)->node != to->node;
@@ -272,7 +254,7 @@ static uint8_t next_source(profile_plan_t *plan)
 {
     const profile_frame_t *top = &plan->top;
     const uint8_t entry = entry_of(plan, top->input);
-    if (entry != PDCP_NONE && profile_is_awaited(plan->scene, &entry_at(plan, entry)->output)) {
+    if (entry != PDCP_NONE && profile_scene_is_awaited(plan->scene, &entry_at(plan, entry)->output)) {
         return PDCP_NONE; /* its source will be back in a moment */
     }
     if (top->source == SOURCE_SIMILAR) {
@@ -686,7 +668,7 @@ static const profile_ref_t *broken_end(profile_plan_t *plan)
     } else if (plan->output != PDCP_NONE || plan->want[plan->input] != PDCP_NONE) {
         return NULL;
     }
-    return profile_is_awaited(plan->scene, missing) ? NULL : missing;
+    return profile_scene_is_awaited(plan->scene, missing) ? NULL : missing;
 }
 
 /* How alike the two ends would be with the best replacement, plus 1; 0: there is none. NOT_YET. */
@@ -831,22 +813,12 @@ static void autoconfigure(profile_plan_t *plan)
 
 /* --- The whole --- */
 
-/* The output that feeds an input, as the tables are; PDCP_NONE: none does, or it does not count. */
-static uint8_t working(const profile_scene_t *scene, uint8_t input)
-{
-    const uint8_t feed = profile_feed(scene->nodes, input);
-    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
-        return PDCP_NONE;
-    }
-    return feed;
-}
-
 /* A hash (FNV-1a) of the links of a plan, or of those that work. */
 static uint32_t hash_links(const profile_plan_t *plan, const profile_scene_t *scene)
 {
     uint32_t sum = 2166136261uL;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        sum = (sum ^ (plan != NULL ? plan->want[i] : working(scene, i))) * 16777619uL;
+        sum = (sum ^ (plan != NULL ? plan->want[i] : profile_scene_feed(scene, i))) * 16777619uL;
     }
     return sum;
 }
@@ -859,7 +831,7 @@ static uint32_t hash_want(profile_plan_t *plan)
 
 static void look(profile_plan_t *plan)
 {
-    set_source(plan, plan->at, working(plan->scene, plan->at));
+    set_source(plan, plan->at, profile_scene_feed(plan->scene, plan->at));
     if (was_last(plan, PDCP_CHANNELS_MAX)) {
         plan->base = hash_want(plan);
         plan->before = plan->base;
@@ -872,8 +844,8 @@ static void find_awaited(profile_plan_t *plan)
     const profile_entry_t *entry = entry_at(plan, plan->at);
     if (plan->at < plan->links->count) {
         plan->left -= 2 * EFFORT_FIND;
-        if (profile_is_awaited(plan->scene, &entry->output) ||
-            profile_is_awaited(plan->scene, &entry->input)) {
+        if (profile_scene_is_awaited(plan->scene, &entry->output) ||
+            profile_scene_is_awaited(plan->scene, &entry->input)) {
             plan->waits = true;
         }
     }
@@ -1053,18 +1025,4 @@ bool profile_plan_step(profile_plan_t *plan, const profile_scene_t *scene, int16
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene)
 {
     return hash_links(NULL, scene) != plan->base;
-}
-
-bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
-{
-    if (!profile_is_sole(&nodes->channels[input])) {
-        return false;
-    }
-    const pdcp_channel_t *channel = nodes->channels;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
-        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(channel)) {
-            return true;
-        }
-    }
-    return false;
 }

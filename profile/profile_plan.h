@@ -14,9 +14,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_bits.h"
 #include "pdcp_nodes.h"
 #include "profile_links.h"
+#include "profile_scene.h"
 
 /* What is to be planned, in this order. */
 typedef enum {
@@ -35,34 +35,12 @@ enum {
     PROFILE_PLAN_DEPTH = 64, /* a chain of required inputs is followed so far; deeper ones fail (D-PRO-17) */
     PROFILE_PLAN_SHARE = 8,  /* the search for one link with all that it requires may take one part in so many
                                 of the steps that are left: those behind it get theirs */
-    PROFILE_BANNED_MAX = 8,
     PROFILE_PLAN_SLICE = 150, /* effort of a slice: half a millisecond of a dsPIC33 at 40 MIPS (D-PRO-23) */
     PROFILE_PLAN_UNIT = 300   /* what cannot be cut takes no more: a slice may be longer by so much */
 };
 
 /* Channels looked at in one plan (D-PRO-17). What is not found within is not found. */
 #define PROFILE_PLAN_STEPS 200000uL
-
-#define PROFILE_CHANNEL_BYTES PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)
-#define PROFILE_PLACE_BYTES PDCP_BIT_BYTES(PDCP_DEVICES_MAX)
-
-/* A link that a device has refused or not answered: not planned until the ban is lifted. */
-typedef struct {
-    uint8_t output;
-    uint8_t input;
-} profile_pair_t;
-
-/* What a plan is made from. */
-typedef struct {
-    const pdcp_nodes_t *nodes;
-    profile_links_t *links; /* changed only when the plan is done: their stand_in, and entries are removed by
-                               PROFILE_PLAN_ENFORCE */
-    uint8_t made[PROFILE_CHANNEL_BYTES];  /* inputs whose links do not count as working: those that the plan
-                                             has made so far */
-    uint8_t awaited[PROFILE_PLACE_BYTES]; /* devices that are away for a moment only and not replaced */
-    uint8_t banned_count;
-    profile_pair_t banned[PROFILE_BANNED_MAX];
-} profile_scene_t;
 
 /* One input that is being connected. */
 typedef struct {
@@ -136,11 +114,5 @@ bool profile_plan_is_stale(profile_plan_t *plan, const profile_scene_t *scene);
 
 /* Do other links work than those that the plan was begun with? */
 bool profile_plan_links_differ(const profile_plan_t *plan, const profile_scene_t *scene);
-
-/* Would the link give an output a second sole-access input, as the tables are? */
-bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
-
-/* Is the device of an end only away for a moment: awaited, or being set up at this time (D-PRO-13)? */
-bool profile_is_awaited(const profile_scene_t *scene, const profile_ref_t *end);
 
 #endif

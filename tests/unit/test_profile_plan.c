@@ -772,15 +772,15 @@ static void test_a_device_that_is_being_set_up_is_awaited(void)
     set_up("D1 out 1 5000 2110; D2 in 1 5300 2110; D3 out 1 5000 2120", "1.1>2.1");
     const profile_scene_t scene = systems_scene(&s);
     pdcp_node_t *node = &s.nodes.nodes[systems_place(&s, 1)];
-    TEST_ASSERT_FALSE(profile_is_awaited(&scene, &s.links.entries[0].output));
+    TEST_ASSERT_FALSE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
     node->state = PDCP_NODE_SETUP;
-    TEST_ASSERT_TRUE(profile_is_awaited(&scene, &s.links.entries[0].output));
+    TEST_ASSERT_TRUE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
     expect("");
     node->setup_again = true; /* it has failed before (D-BUS-17) */
-    TEST_ASSERT_FALSE(profile_is_awaited(&scene, &s.links.entries[0].output));
+    TEST_ASSERT_FALSE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
     expect("3.1>2.1");
     forget(1);
-    TEST_ASSERT_FALSE(profile_is_awaited(&scene, &s.links.entries[0].output));
+    TEST_ASSERT_FALSE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
 }
 
 /* --- What is asked for --- */

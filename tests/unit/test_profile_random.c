@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "profile_match.h"
 #include "systems.h"
 #include "unity.h"
 

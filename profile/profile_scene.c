@@ -1,0 +1,36 @@
+#include "profile_scene.h"
+
+#include "profile_match.h"
+
+bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
+{
+    const uint8_t place = profile_links_place(scene->links, scene->nodes, end);
+    if (place == PDCP_NONE) {
+        return false;
+    }
+    const pdcp_node_t *node = &scene->nodes->nodes[place];
+    if (node->state == PDCP_NODE_LOST) {
+        return pdcp_bit(scene->awaited, place);
+    }
+    return node->state == PDCP_NODE_SETUP && !node->setup_again;
+}
+
+bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8_t input)
+{
+    const profile_pair_t *banned = scene->banned;
+    for (uint8_t i = scene->banned_count; i > 0; i--, banned++) {
+        if (banned->output == output && banned->input == input) {
+            return true;
+        }
+    }
+    return false;
+}
+
+uint8_t profile_scene_feed(const profile_scene_t *scene, uint8_t input)
+{
+    const uint8_t feed = profile_feed(scene->nodes, input);
+    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
+        return PDCP_NONE;
+    }
+    return feed;
+}

@@ -62,7 +62,7 @@ typedef struct {
     uint32_t arrival_ms; /* the plan that is due waits so long at most, unless it is urgent */
     uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
     uint32_t retry_ms;   /* means something while links are banned */
-    profile_plan_t plan;
+    profile_board_t plan;
     profile_links_t links; /* the active configuration */
 } profile_run_t;
 

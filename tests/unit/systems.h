@@ -35,7 +35,7 @@ typedef struct {
 typedef struct {
     pdcp_nodes_t nodes;
     profile_links_t links;
-    profile_plan_t plan;
+    profile_board_t plan;
     uint8_t made[PROFILE_CHANNEL_BYTES];
     uint8_t awaited[PROFILE_PLACE_BYTES];
     profile_pair_t banned[PROFILE_BANNED_MAX];

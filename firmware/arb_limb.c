@@ -4,7 +4,11 @@
 #include <string.h>
 
 #include "pdcp_time.h"
+#include "profile_active.h"
+#include "profile_events.h"
 #include "profile_match.h"
+#include "profile_start.h"
+#include "profile_step.h"
 
 #define SCORE_BOTH 256u /* of a link that is there with both ends; with one end: 1 */
 
@@ -173,7 +177,7 @@ static void on_link(void *ctx, uint8_t number, const profile_link_t *link)
         return;
     } else if (limb->stage == STAGE_CHECK) {
         limb->score++;
-    } else if (!profile_run_load_link(&limb->run, link)) {
+    } else if (!profile_active_load_link(&limb->run, link)) {
         limb->error = ARB_ERR_STORAGE; /* of the load; the link is left out */
     }
 }
@@ -189,7 +193,7 @@ static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
 {
     limb->stage = STAGE_IDLE;
     set_active(limb, number);
-    profile_run_start(&limb->run, arb, number != 0);
+    profile_start_begin(&limb->run, arb, number != 0);
     limb->run.changed = false; /* what was loaded or read back is not a change to be saved */
 }
 
@@ -211,7 +215,7 @@ static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb)
 static void end_score(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     compare(limb);
-    profile_run_load_begin(&limb->run, true);
+    profile_active_load_begin(&limb->run, true);
     limb->number = limb->best;
     if (limb->status != ARB_CONFIG_OK || limb->best == 0 || read_all(limb, STAGE_START) != ARB_OK) {
         start(limb, arb, 0);
@@ -222,7 +226,7 @@ static void end_score(arb_limb_t *limb, pdcp_arb_t *arb)
 static void end_start(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status != ARB_CONFIG_OK) {
-        profile_run_load_begin(&limb->run, true);
+        profile_active_load_begin(&limb->run, true);
         limb->number = 0;
     }
     start(limb, arb, limb->number);
@@ -238,7 +242,7 @@ static void get_link(void *ctx, uint8_t k, profile_link_t *link)
 
 static uint8_t begin_save(arb_limb_t *limb)
 {
-    if (!profile_run_take_up(&limb->run)) {
+    if (!profile_active_take_up(&limb->run)) {
         return ARB_ERR_STORAGE;
     }
     const arb_config_status_t status = arb_config_save(&limb->config, &limb->number, limb->run.links.count);
@@ -251,7 +255,7 @@ static uint8_t begin_save(arb_limb_t *limb)
 static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     limb->run.frozen = false;
-    (void)profile_run_take_up(&limb->run);
+    (void)profile_active_take_up(&limb->run);
     if (limb->status >= 0) {
         limb->unsaved = false;
         pdcp_arb_plan_links(arb, true);
@@ -274,7 +278,7 @@ static void end_check(arb_limb_t *limb)
         end(limb, ARB_ERR_STORAGE);
         return;
     }
-    profile_run_load_begin(&limb->run, false);
+    profile_active_load_begin(&limb->run, false);
 }
 
 static void plan(arb_limb_t *limb, uint8_t what, bool anew)
@@ -317,7 +321,7 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
 static void plan_for_host(arb_limb_t *limb, uint8_t what, bool clear)
 {
     if (clear) {
-        profile_run_load_begin(&limb->run, false);
+        profile_active_load_begin(&limb->run, false);
     }
     if (limb->run.state == PROFILE_WAITING) {
         end(limb, ARB_OK);
@@ -328,7 +332,7 @@ static void plan_for_host(arb_limb_t *limb, uint8_t what, bool clear)
 
 bool arb_limb_is_starting(const arb_limb_t *limb)
 {
-    return profile_run_is_starting(&limb->run);
+    return profile_start_is_pending(&limb->run);
 }
 
 uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
@@ -346,7 +350,7 @@ uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
     case ARB_ACTION_ERASE:
         return begin_erase(limb);
     case ARB_ACTION_ADOPT:
-        limb->result = profile_run_adopt(&limb->run);
+        limb->result = profile_active_adopt_stand_ins(&limb->run);
         end(limb, ARB_OK);
         return ARB_OK;
     case ARB_ACTION_AUTOCONFIGURE:
@@ -375,7 +379,7 @@ void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms,
             end(limb, ARB_ERR_NOT_READY);
         }
     }
-    profile_run_on_event(&limb->run, arb, now_ms, event);
+    profile_events_take(&limb->run, arb, now_ms, event);
 }
 
 /* A job of arb_config has ended; at another stage it was the host's. */
@@ -434,10 +438,10 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
     if (limb->status != ARB_CONFIG_ERR_BUSY) {
         next_stage(limb, arb);
     }
-    if (limb->stage == STAGE_IDLE && profile_run_is_quiet(&limb->run, arb, now_ms)) {
+    if (limb->stage == STAGE_IDLE && profile_start_may_begin(&limb->run, arb, now_ms)) {
         begin_start(limb, arb);
     }
-    const bool handed = profile_run_step(&limb->run, arb, now_ms);
+    const bool handed = profile_step(&limb->run, arb, now_ms);
     if (limb->stage == STAGE_PLAN && limb->run.state != PROFILE_CONFIGURING) {
         limb->result = limb->run.moves;
         end(limb, limb->error);
@@ -448,7 +452,7 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
 
 uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms)
 {
-    uint32_t next_ms = profile_run_next_ms(&limb->run, arb, now_ms);
+    uint32_t next_ms = profile_step_next_ms(&limb->run, arb, now_ms);
     next_ms = pdcp_time_earlier(next_ms, arb_config_next_ms(&limb->config, now_ms));
     next_ms = pdcp_time_earlier(next_ms, arb_flags_next_ms(&limb->flags, now_ms));
     if (may_auto_save(limb)) {

@@ -14,8 +14,7 @@
 #include "profile_links.h"
 #include "profile_scene.h"
 
-/* Limits of a plan ----------------------------------------------------------------------------------------
- */
+/* Limits of a plan --------------------------------------------------------------------------------------- */
 
 enum {
     PROFILE_PLAN_DEPTH = 64, /* a chain of required inputs is followed so far; deeper ones fail (D-PRO-17) */
@@ -32,8 +31,7 @@ enum {
     PROFILE_EFFORT_SCAN = 24 /* to look for something among all entries or channels */
 };
 
-/* Types ---------------------------------------------------------------------------------------------------
- */
+/* Types -------------------------------------------------------------------------------------------------- */
 
 /* What a plan does next. Each phase does one unit of its work at a time and returns the phase that follows,
  * which may be itself.
@@ -209,8 +207,7 @@ bool profile_board_stands_in(profile_board_t *board, uint8_t input);
 /* Forgets stand-ins that do not hear what they stand in for any more. */
 void profile_board_forget_stand_ins(profile_board_t *board);
 
-/* Phases --------------------------------------------------------------------------------------------------
- */
+/* Phases ------------------------------------------------------------------------------------------------- */
 
 /* Moves `at` on to the next one of so many entries or inputs; behind the last one it is 0. */
 void profile_board_go_to_next(profile_board_t *board, uint8_t count);

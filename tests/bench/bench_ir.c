@@ -8,6 +8,7 @@
 #include "bench_bus.h"
 #include "pdcp_codec.h"
 #include "pdcp_setup.h"
+#include "profile_start.h"
 
 #define SETTLE_US 20000000u
 #define BEACON_GAP_US (PDCP_BEACON_MS * 1000u / BENCH_DEVICES)
@@ -199,7 +200,7 @@ static void do_idle_step(job_t *job, uint32_t count)
 static void do_profile_start(job_t *job, uint32_t count)
 {
     for (uint32_t i = 0; i < count; i++) {
-        profile_run_start(&job->app->limb.run, &job->app->arb, false);
+        profile_start_begin(&job->app->limb.run, &job->app->arb, false);
     }
     check(job->app->limb.run.state == PROFILE_CONFIGURING, "no plan was begun");
 }

@@ -3,6 +3,8 @@
 
 #include "arb_app.h"
 #include "hostlink.h"
+#include "profile_events.h"
+#include "profile_step.h"
 #include "systems.h"
 #include "unity.h"
 
@@ -45,10 +47,10 @@ void tearDown(void) {}
 static void make_slices(int count)
 {
     for (int i = 0; i < count; i++) {
-        (void)profile_run_step(&app.limb.run, &app.arb, x.now_ms);
+        (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
         TEST_ASSERT_EQUAL(PROFILE_MAKING, app.limb.run.making);
         TEST_ASSERT_FALSE(app.limb.run.wishing);
-        TEST_ASSERT_EQUAL_UINT32(x.now_ms, profile_run_next_ms(&app.limb.run, &app.arb, x.now_ms));
+        TEST_ASSERT_EQUAL_UINT32(x.now_ms, profile_step_next_ms(&app.limb.run, &app.arb, x.now_ms));
     }
 }
 
@@ -58,7 +60,7 @@ static int finish_plan(void)
     int slices = 0;
     do {
         TEST_ASSERT_LESS_THAN(SLICES_MAX, ++slices);
-        (void)profile_run_step(&app.limb.run, &app.arb, x.now_ms);
+        (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
     } while (app.limb.run.making == PROFILE_MAKING);
     TEST_ASSERT_EQUAL(PROFILE_JUST_MADE, app.limb.run.making);
     TEST_ASSERT_FALSE(app.limb.run.wishing);
@@ -73,7 +75,7 @@ static void begin_plan(void)
 static void tell(pdcp_event_kind_t kind, uint8_t node)
 {
     const pdcp_event_t event = {.kind = kind, .node = node, .channel = PDCP_NONE};
-    profile_run_on_event(&app.limb.run, &app.arb, x.now_ms, &event);
+    profile_events_take(&app.limb.run, &app.arb, x.now_ms, &event);
 }
 
 /* The plan is the one that these tables give in one go. */
@@ -89,7 +91,7 @@ static void test_a_plan_that_nothing_disturbs(void)
     begin_plan();
     TEST_ASSERT_GREATER_THAN(10, finish_plan());
     expect_plan_of_the_tables();
-    (void)profile_run_step(&app.limb.run, &app.arb, x.now_ms);
+    (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
     TEST_ASSERT_TRUE(app.limb.run.wishing); /* and then it is carried out */
 }
 

@@ -1,0 +1,134 @@
+#include "profile_active.h"
+
+#include "profile_match.h"
+
+uint8_t profile_active_entry_of(const profile_run_t *run, uint8_t input)
+{
+    return profile_links_of(&run->links, run->scene.nodes, input);
+}
+
+uint8_t profile_active_stood_in_for(const profile_run_t *run, uint8_t input)
+{
+    for (uint8_t e = 0; e < run->links.count; e++) {
+        if (run->links.entries[e].stand_in == input) {
+            return e;
+        }
+    }
+    return PDCP_NONE;
+}
+
+static bool store_link(profile_run_t *run, const profile_link_t *link, bool by_host)
+{
+    run->stale = true;
+    return profile_links_put(&run->links, link, by_host);
+}
+
+void profile_active_remove(profile_run_t *run, uint8_t entry)
+{
+    run->stale = true;
+    profile_links_remove(&run->links, entry);
+}
+
+bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    profile_link_t link;
+    profile_end_of(nodes, input, &link.input);
+    if (run->frozen || !profile_source_of(nodes, input, &link.output) ||
+        (!by_host && profile_links_is_claimed(&run->links, &link))) {
+        return true;
+    }
+    if (!store_link(run, &link, by_host)) {
+        return false;
+    }
+    run->changed = true;
+    return true;
+}
+
+bool profile_active_take_up(profile_run_t *run)
+{
+    bool complete = true;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (profile_feed(run->scene.nodes, i) != PDCP_NONE && profile_active_entry_of(run, i) == PDCP_NONE &&
+            profile_active_stood_in_for(run, i) == PDCP_NONE && !profile_active_adopt(run, i, false)) {
+            complete = false;
+        }
+    }
+    return complete;
+}
+
+/* The input of a device (PDCP_NONE: of any) that names a source and comes next behind the last one;
+ * PDCP_NONE: there are no more. */
+static uint8_t next_input_of(const pdcp_nodes_t *nodes, uint8_t node, uint8_t last)
+{
+    uint8_t best = PDCP_NONE;
+    profile_end_t source;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if ((node == PDCP_NONE || nodes->channels[i].node == node) &&
+            profile_is_ready(nodes, i, PDCP_INPUT) && profile_source_of(nodes, i, &source) &&
+            (last == PDCP_NONE || profile_is_before(nodes, last, i)) &&
+            (best == PDCP_NONE || profile_is_before(nodes, i, best))) {
+            best = i;
+        }
+    }
+    return best;
+}
+
+void profile_active_read_back(profile_run_t *run, uint8_t node)
+{
+    uint8_t input = PDCP_NONE;
+    while ((input = next_input_of(run->scene.nodes, node, input)) != PDCP_NONE) {
+        if (profile_active_entry_of(run, input) == PDCP_NONE) {
+            (void)profile_active_adopt(run, input, false);
+        }
+    }
+}
+
+void profile_active_load_begin(profile_run_t *run, bool keep_host)
+{
+    for (uint8_t e = run->links.count; e > 0; e--) {
+        if (!keep_host || !run->links.entries[e - 1].by_host) {
+            profile_active_remove(run, (uint8_t)(e - 1));
+        }
+    }
+}
+
+bool profile_active_load_link(profile_run_t *run, const profile_link_t *link)
+{
+    return profile_links_find(&run->links, &link->input.owner, link->input.index) != PDCP_NONE ||
+           store_link(run, link, false);
+}
+
+/* The entry that an input's link, if it works, replaces: the one that it stands in for, or its own if its
+ * source is another. PDCP_NONE: there is none. */
+static uint8_t replaced_by(const profile_run_t *run, uint8_t input)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const uint8_t feed = profile_feed(nodes, input);
+    if (feed == PDCP_NONE) {
+        return PDCP_NONE;
+    }
+    uint8_t entry = profile_active_stood_in_for(run, input);
+    if (entry == PDCP_NONE) {
+        entry = profile_active_entry_of(run, input);
+        if (entry != PDCP_NONE && profile_links_channel(&run->links, nodes, &run->links.entries[entry].output,
+                                                        PDCP_OUTPUT) == feed) {
+            return PDCP_NONE;
+        }
+    }
+    return entry;
+}
+
+uint8_t profile_active_adopt_stand_ins(profile_run_t *run)
+{
+    uint8_t adopted = 0;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const uint8_t entry = replaced_by(run, i);
+        if (entry != PDCP_NONE) {
+            profile_active_remove(run, entry);
+            (void)profile_active_adopt(run, i, false);
+            adopted++;
+        }
+    }
+    return adopted;
+}

@@ -1,0 +1,170 @@
+#include "profile_carry.h"
+
+#include <string.h>
+
+#include "profile_active.h"
+#include "profile_match.h"
+
+/* What an input without a link names as its source is not part of the configuration: it shall name none
+ * (D-BUS-38). */
+static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+{
+    profile_end_t source;
+    if (profile_source_of(run->scene.nodes, input, &source)) {
+        pdcp_arb_forget_source(arb, now_ms, input);
+    }
+}
+
+/* The link of an input is not to be: what the configuration has rests, what it has not goes. The host sees a
+ * link of the configuration whose source is missing as inactive (D-BUS-10, D-PRO-15). */
+static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+{
+    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    const uint8_t entry = profile_active_entry_of(run, input);
+    bool original = false;
+    if (entry != PDCP_NONE) {
+        const profile_ref_t *output = &run->links.entries[entry].output;
+        const pdcp_identity_t *owner = &run->links.parts[output->part].identity;
+        if (channel->link == PDCP_LINK_NONE) {
+            pdcp_arb_remember(arb, now_ms, input, owner, output->index, output->type, output->profile);
+            return;
+        }
+        original = output->index == channel->source_index && pdcp_identity_equal(owner, &channel->source);
+    }
+    if (channel->link == PDCP_LINK_NONE) {
+        forget_source(run, arb, now_ms, input);
+        return;
+    }
+    if (channel->link == PDCP_LINK_ACTIVE) {
+        run->moves++;
+        if (original) {
+            pdcp_arb_rest(arb, now_ms, input);
+        }
+    }
+    if (!original) {
+        pdcp_set_bit(run->dropping, input, true);
+        (void)pdcp_arb_disconnect(arb, input);
+    }
+}
+
+/* Takes away what is not wanted. */
+static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
+{
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        if (run->plan.want[i] == PDCP_NONE && profile_is_ready(run->scene.nodes, i, PDCP_INPUT)) {
+            unlink_one(run, arb, now_ms, i);
+        }
+    }
+}
+
+/* Does a channel require an input of its device that is not connected? */
+static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
+{
+    const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
+    uint8_t c = owner->needs_stride != 0 ? owner->first_channel : (uint8_t)PDCP_NONE;
+    while (c != PDCP_NONE && (profile_feed(nodes, c) != PDCP_NONE ||
+                              !pdcp_nodes_needs(nodes, channel, false, nodes->channels[c].index))) {
+        c = nodes->channels[c].next;
+    }
+    return c != PDCP_NONE;
+}
+
+/* Is this a link of the host's, which needs nothing (D-PRO-9)? */
+static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
+{
+    const uint8_t entry = profile_active_entry_of(run, input);
+    if (entry == PDCP_NONE) {
+        return false;
+    }
+    const profile_entry_t *own = &run->links.entries[entry];
+    return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, feed);
+}
+
+/* Does a link work that should not, because something that it requires is not connected? Links that the plan
+ * under way has made are left alone: those of a loop would never be made. */
+static bool is_lacking(const profile_run_t *run, uint8_t input)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const uint8_t feed = profile_feed(nodes, input);
+    return feed != PDCP_NONE && !pdcp_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
+           (misses_something(nodes, feed) || misses_something(nodes, input));
+}
+
+/* A plan may mean to connect what a working link requires, and most often that is done at once. When it does
+ * not go well, the link rests meanwhile (D-PRO-9): a device that does not answer may take long, and a hand
+ * would obey a controller that hears nothing. True: a link rests now. */
+static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
+{
+    bool rested = false;
+    uint8_t i = 0;
+    if (run->tries + run->scene.banned_count == 0 || run->what == PROFILE_PLAN_ENFORCE) {
+        return false;
+    }
+    while (i < PDCP_CHANNELS_MAX) {
+        if (is_lacking(run, i)) {
+            pdcp_arb_rest(arb, now_ms, i);
+            rested = true;
+            i = 0; /* others may require this one */
+        } else {
+            i++;
+        }
+    }
+    return rested;
+}
+
+/* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have
+ * gone since the plan was made are the next plan's business. */
+static uint8_t next_input(const profile_run_t *run)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    uint8_t found = PDCP_NONE;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
+        const uint8_t output = run->plan.want[i];
+        const pdcp_channel_t *channel = &nodes->channels[i];
+        if (!profile_is_ready(nodes, output, PDCP_OUTPUT) || !profile_is_ready(nodes, i, PDCP_INPUT) ||
+            (channel->link == PDCP_LINK_ACTIVE && channel->feed == output)) {
+            continue;
+        }
+        if (!profile_is_terminal(channel)) {
+            return i;
+        }
+        if (found == PDCP_NONE) {
+            found = i;
+        }
+    }
+    return found;
+}
+
+static void finish(profile_run_t *run)
+{
+    run->state = PROFILE_RUNNING;
+    run->what = 0;
+    memset(run->scene.made, 0, sizeof run->scene.made);
+    (void)profile_active_take_up(run);
+}
+
+bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
+{
+    if (!pdcp_arb_links_settled(arb)) {
+        return false;
+    }
+    unlink_all(run, arb, now_ms);
+    if (!pdcp_arb_links_settled(arb)) {
+        return true;
+    }
+    if (rest_lacking(run, arb, now_ms)) {
+        return true;
+    }
+    const uint8_t input = next_input(run);
+    if (input == PDCP_NONE) {
+        finish(run);
+        return false;
+    }
+    run->wish.input = input;
+    run->wish.output = run->plan.want[input];
+    run->wishing = pdcp_arb_connect(arb, run->wish.output, input) == PDCP_OK;
+    if (!run->wishing) { /* a device has changed its channels meanwhile */
+        profile_run_stir(run, now_ms);
+    }
+    return true;
+}

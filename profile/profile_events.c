@@ -1,0 +1,207 @@
+#include "profile_events.h"
+
+#include <string.h>
+
+#include "profile_active.h"
+#include "profile_match.h"
+#include "profile_start.h"
+
+static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+{
+    const bool urgent = run->urgent;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
+        if (run->scene.nodes->channels[i].node == node) {
+            pdcp_set_bit(run->dropping, i, false);
+        }
+    }
+    pdcp_set_bit(run->scene.awaited, node, false);
+    if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
+        profile_active_read_back(run, node);
+    }
+    if (run->due == 0) {
+        run->arrival_ms = now_ms + PROFILE_ARRIVAL_MS;
+    }
+    profile_run_stir(run, now_ms);
+    run->urgent = urgent;
+}
+
+/* The host has reset a device: it will be back in a moment. */
+static void on_reset(profile_run_t *run, uint32_t now_ms, const pdcp_event_t *event)
+{
+    if (event->status == PDCP_OK) {
+        pdcp_set_bit(run->scene.awaited, event->node, true);
+        run->awaited_ms = now_ms + PROFILE_RESET_MS;
+    }
+}
+
+/* Leaves a pair out of plans for a while (D-PRO-14). The oldest of too many is tried again. */
+static void ban(profile_run_t *run, uint32_t now_ms, profile_pair_t pair)
+{
+    memmove(&run->scene.banned[1], &run->scene.banned[0],
+            sizeof run->scene.banned - sizeof run->scene.banned[0]);
+    run->scene.banned[0] = pair;
+    if (run->scene.banned_count < PROFILE_BANNED_MAX) {
+        run->scene.banned_count++;
+    }
+    run->tries = 0;
+    run->retry_ms = now_ms + PROFILE_RETRY_MS;
+}
+
+/* A link that worked does not any more, and nobody in this layer wanted that: an end is missing, which may
+ * have been lost before it beaconed, its device names another source, or does not answer. To make it again
+ * counts as its second try in the last case. */
+static void on_broken(profile_run_t *run, uint8_t input)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    run->plan.want[input] = PDCP_NONE;
+    if (profile_is_ready(nodes, input, PDCP_INPUT) &&
+        profile_is_ready(nodes, nodes->channels[input].feed, PDCP_OUTPUT)) {
+        run->tries = 1;
+    }
+    profile_run_make_due(run, run->at_events);
+}
+
+/* A link that this layer has asked for is made, or is not. On a bad line, or when a device was away for a
+ * moment, an answer is missing now and then, which must not lead to another limb: it is tried again. */
+static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
+{
+    run->wishing = false;
+    if (status == PDCP_OK) {
+        run->tries = 0;
+        pdcp_set_bit(run->scene.made, run->wish.input, true);
+        run->moves++;
+        return;
+    }
+    if (run->what == PROFILE_PLAN_ENFORCE) { /* it was lost meanwhile; the action ends without it */
+        on_broken(run, run->wish.input);
+        return;
+    }
+    run->tries++;
+    if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
+        ban(run, now_ms, run->wish);
+    }
+    profile_run_make_due(run, run->what);
+}
+
+/* A link that the host has asked for is made, or is not: what rested for want of it comes back. */
+static void on_hosts_wish(profile_run_t *run, const pdcp_event_t *event)
+{
+    if (event->status == PDCP_OK) {
+        (void)profile_active_adopt(run, event->channel, true);
+        profile_run_make_due(run, PROFILE_PLAN_ORIGINALS);
+    }
+}
+
+/* Is the working link of an input another one than the plan knows or wants? */
+static bool is_unexpected(const profile_run_t *run, uint8_t input)
+{
+    return run->making == PROFILE_MAKING ? profile_plan_links_differ(&run->plan, &run->scene)
+                                         : run->scene.nodes->channels[input].feed != run->plan.want[input];
+}
+
+/* An input's device has asked for its link (Update Data Channel). It may lack what it requires, or break sole
+ * access: then it does not count as working, and the plan decides. */
+static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
+{
+    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const pdcp_channel_t *channel = &nodes->channels[input];
+    if (entry == PDCP_NONE && profile_active_stood_in_for(run, input) == PDCP_NONE) {
+        (void)profile_active_adopt(run, input, false);
+    }
+    if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
+        pdcp_set_bit(run->scene.made, input, profile_breaks_sole_access(nodes, channel->feed, input));
+        profile_run_make_due(run, run->at_events);
+    }
+}
+
+/* The host has taken a link away: it is none of the configuration any more, no plan makes it again, and what
+ * requires its input rests (D-PRO-25). */
+static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
+{
+    run->plan.want[input] = PDCP_NONE;
+    if (entry != PDCP_NONE && !run->frozen) {
+        profile_active_remove(run, entry);
+        run->changed = true;
+    }
+    profile_run_make_due(run, PROFILE_PLAN_SETTLE);
+}
+
+/* The audit has let the link of an input go. The pair is left out as one that could not be linked (D-PRO-14),
+ * and what requires the input rests (D-BUS-40). Nothing is put in its place: somebody who disturbs a link
+ * shall not get another limb by it (D-PRO-26). */
+static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
+{
+    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
+    run->plan.want[input] = PDCP_NONE;
+    ban(run, now_ms, pair);
+    profile_run_make_due(run, PROFILE_PLAN_SETTLE);
+}
+
+/* Did the last plan, which is done, want a link that does not work any more? While it is about to be made
+ * again, it is not broken. */
+static bool is_broken(const profile_run_t *run, uint8_t input)
+{
+    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    return run->state == PROFILE_RUNNING && run->plan.want[input] != PDCP_NONE &&
+           channel->link != PDCP_LINK_ACTIVE && (channel->todo & PDCP_TODO_CONNECT) == 0;
+}
+
+/* The link of an input has changed, by whomever. That of a link which this layer has asked for comes with
+ * PDCP_EVENT_WISH. */
+static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
+{
+    const uint8_t link = run->scene.nodes->channels[input].link;
+    const uint8_t entry = profile_active_entry_of(run, input);
+    const bool dropping = pdcp_bit(run->dropping, input);
+    if (link == PDCP_LINK_NONE) {
+        pdcp_set_bit(run->dropping, input, false);
+    }
+    if (dropping) {
+        return;
+    }
+    if (link == PDCP_LINK_NONE && arb->bus.link.kind == PDCP_TODO_REMOVE) {
+        on_removed(run, input, entry);
+    } else if (is_broken(run, input)) {
+        on_broken(run, input);
+    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_WAITING && !arb->bus.link.stored &&
+               !run->wishing) {
+        on_asked(run, input, entry);
+    }
+}
+
+void profile_events_take(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
+                         const pdcp_event_t *event)
+{
+    switch (event->kind) {
+    case PDCP_EVENT_READY:
+        on_ready(run, arb, now_ms, event->node);
+        break;
+    case PDCP_EVENT_SETUP_FAILED:
+    case PDCP_EVENT_LOST:
+        profile_run_stir(run, now_ms);
+        break;
+    case PDCP_EVENT_RESET:
+        on_reset(run, now_ms, event);
+        break;
+    case PDCP_EVENT_WISH:
+        if (run->wishing) {
+            on_wish(run, now_ms, (pdcp_status_t)event->status);
+        } else {
+            on_hosts_wish(run, event);
+        }
+        break;
+    case PDCP_EVENT_LINK:
+        if (event->status == PDCP_ERR_DIFFERS) {
+            on_let_go(run, now_ms, event->channel);
+        } else if (event->channel != PDCP_NONE) {
+            on_link(run, arb, event->channel);
+        }
+        break;
+    case PDCP_EVENT_SILENT:
+    case PDCP_EVENT_STARTED:
+        profile_start_wait(run, now_ms);
+        break;
+    default:
+        break;
+    }
+}

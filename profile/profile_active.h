@@ -1,5 +1,4 @@
-/* The active configuration follows what happens (D-PRO-11): which links become part of it, and which leave
- * it.
+/* Keeps the active configuration in step with what happens (D-PRO-11): adds links to it and removes them.
  *
  * The links themselves are run->links (profile_links.h). Every change of them makes a plan that is being made
  * stale. Nothing is sent here. */
@@ -19,11 +18,11 @@
 void profile_active_load_begin(profile_run_t *run, bool keep_host);
 bool profile_active_load_link(profile_run_t *run, const profile_link_t *link);
 
-/* Makes what stands in for missing ends the configuration. Returns how many links have changed. */
+/* Replaces the entries of missing ends by what stands in for them. Returns how many links have changed. */
 uint8_t profile_active_adopt_stand_ins(profile_run_t *run);
 
-/* Makes links that work without being in the active configuration part of it, unless it is frozen. False: one
- * is left out, for want of room. */
+/* Adds links that work without being in the active configuration, unless it is frozen. False: there was no
+ * room for one. */
 bool profile_active_take_up(profile_run_t *run);
 
 /* For the other files of the layer ----------------------------------------------------------------------- */
@@ -34,14 +33,14 @@ uint8_t profile_active_entry_of(const profile_run_t *run, uint8_t input);
 /* The entry whose missing input this one stands in for; PDCP_NONE: it does not stand in. */
 uint8_t profile_active_stood_in_for(const profile_run_t *run, uint8_t input);
 
-/* Makes the link that an input has, or whose source it names, one of the configuration, unless it is frozen.
- * A link that breaks sole access becomes one only by the host: a device may remember what it stood in for
- * once. False: there was no room. */
+/* Adds the link that an input has, or whose source it names, unless the configuration is frozen. Only the
+ * host may add one that breaks sole access: a device may still remember a source that it once stood in with.
+ * False: there was no room. */
 bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host);
 
-/* Reads the configuration back from what the inputs of a device (PDCP_NONE: of all) name as their sources
- * (D-PRO-19). It goes through them in an order that does not depend on where they stand: of two that claim
- * the same output the first one has it. */
+/* Reads the configuration back from the sources that the inputs of a device (PDCP_NONE: of all) name
+ * (D-PRO-19). The order does not depend on where they stand in the tables: of two that claim the same output
+ * the first one gets it. */
 void profile_active_read_back(profile_run_t *run, uint8_t node);
 
 void profile_active_remove(profile_run_t *run, uint8_t entry);

@@ -3,7 +3,7 @@
  * The planner works in small units (profile_plan.h), and all that it knows between two of them stands here.
  * Members of a part (search, connect, settle, originals, repair, plan) belong to the file of that name; the
  * others are shared. A channel number PDCP_NONE stands for no channel. The functions below read the scene and
- * change the board alone. */
+ * change only the board. */
 #ifndef PROFILE_BOARD_H
 #define PROFILE_BOARD_H
 
@@ -17,12 +17,12 @@
 /* Limits of a plan --------------------------------------------------------------------------------------- */
 
 enum {
-    PROFILE_PLAN_DEPTH = 64, /* a chain of required inputs is followed so far; deeper ones fail (D-PRO-17) */
-    PROFILE_PLAN_SHARE = 8   /* the search for one link with all that it requires may take one part in so many
-                                of the steps that are left: those behind it get theirs */
+    PROFILE_PLAN_DEPTH = 64, /* length of the longest chain of required inputs; longer ones fail (D-PRO-17) */
+    PROFILE_PLAN_SHARE = 8   /* a link with all that it requires may use one part in so many of the steps that
+                                are left, so that later ones get theirs */
 };
 
-/* Channels looked at in one plan (D-PRO-17). What is not found within is not found. */
+/* Channels that one plan may look at (D-PRO-17). Links that would take more are not made. */
 #define PROFILE_PLAN_STEPS 200000uL
 
 /* What common work takes off `left`; one is about 100 cycles of a dsPIC33 (D-PRO-23). */
@@ -33,19 +33,19 @@ enum {
 
 /* Types -------------------------------------------------------------------------------------------------- */
 
-/* What a plan does next. Each phase does one unit of its work at a time and returns the phase that follows,
- * which may be itself.
+/* What a plan does next. Each call of a phase does one unit of its work and returns the phase that follows,
+ * which may be the same.
  *
- * LOOK and AWAITED come first: which links work, and which ends are awaited. Then come rounds, whose parts
- * are ENFORCE, ORIGINALS, REPAIR, SETTLE and AUTO (profile_plan.c says which of them are planned), until
- * ROUND_END sees that nothing changes any more. FINISH writes to the configuration.
+ * LOOK finds the links that work, AWAITED the ends that are awaited. Rounds follow. Their parts are ENFORCE,
+ * ORIGINALS, REPAIR, SETTLE and AUTO, of which profile_plan.c leaves out those that are not planned.
+ * ROUND_END begins another round until nothing changes. FINISH writes to the configuration.
  *
- * An original that is to come back passes through three more phases. ORIGINALS_TAKE takes away what it
- * replaces, ORIGINALS_LINK links it, and ORIGINALS_JUDGE undoes both if that was not worth it.
+ * ORIGINALS looks for a link that can come back. ORIGINALS_TAKE takes away what it replaces, ORIGINALS_LINK
+ * links it, and ORIGINALS_JUDGE undoes both if that cost too much.
  *
  * REPAIR finds out how good a replacement each broken entry could get. REPAIR_CHOOSE takes the best of them.
- * If its input is missing, REPAIR_INPUT chooses one that is to stand in, and REPAIR_LINK sees whether it
- * could be linked. REPAIR_NAME names stand-ins that came into being otherwise. */
+ * If its input is missing, REPAIR_INPUT tries one that could stand in, and REPAIR_LINK sees whether it was
+ * linked. REPAIR_NAME finds inputs that stand in without being known to. */
 typedef enum {
     PROFILE_PHASE_LOOK, /* all zero is a plan that begins */
     PROFILE_PHASE_AWAITED,
@@ -67,7 +67,7 @@ typedef enum {
     PROFILE_PHASE_NEXT_PART /* only returned: this part of the round is over, the next one begins */
 } profile_phase_t;
 
-/* What a link needs, in the order in which it is seen to: required inputs first. */
+/* What a link needs, in the order in which it is connected: required inputs first. */
 typedef enum {
     PROFILE_REQUIRED_BY_OUTPUT, /* inputs of the source's device that its output requires */
     PROFILE_REQUIRED_BY_INPUT,  /* inputs of the input's own device */
@@ -80,18 +80,18 @@ typedef enum {
 typedef struct {
     uint8_t input;
     uint8_t source; /* profile_source_t: where its next candidate comes from */
-    uint8_t tried;  /* candidate of this source tried last, the one in the plan; PDCP_NONE: none yet */
-    uint8_t mark;   /* where in the log it stands, or will */
-    uint8_t need;   /* profile_need_t seen to; PROFILE_NEEDS_END: its next candidate is to be tried */
-    uint8_t cursor; /* channel number of the need seen to last, PDCP_NONE: none yet */
+    uint8_t tried;  /* candidate of this source tried last, which the plan has now; PDCP_NONE: none yet */
+    uint8_t mark;   /* its place in the log, once it is linked */
+    uint8_t need;   /* profile_need_t being connected; PROFILE_NEEDS_END: a candidate must be chosen */
+    uint8_t cursor; /* channel number of the need connected last, PDCP_NONE: none yet */
 } profile_frame_t;
 
-/* Small state stands first: on small parts, a field that lies far from the beginning costs more code. */
+/* Small state stands first: a field far from the beginning costs more code on small parts. */
 typedef struct {
     uint8_t phase;  /* profile_phase_t */
     uint8_t at;     /* entry or input that the phase is at; 0 again when it has seen all */
-    uint8_t input;  /* the link that the phase is at, */
-    uint8_t output; /* from this output */
+    uint8_t input;  /* input of the link that the phase is at */
+    uint8_t output; /* output of that link */
     bool waits;     /* an end of the configuration is awaited */
     bool changed;   /* this pass over the inputs has changed something */
     uint8_t logged; /* inputs in the log */
@@ -153,7 +153,7 @@ typedef struct {
     uint8_t log[PDCP_CHANNELS_MAX];      /* inputs connected, in order, for undoing */
 } profile_board_t;
 
-/* What stands in the scene ------------------------------------------------------------------------------- */
+/* The scene ---------------------------------------------------------------------------------------------- */
 
 static inline const pdcp_channel_t *profile_board_channel(const profile_board_t *board, uint8_t channel)
 {
@@ -171,16 +171,16 @@ uint8_t profile_board_entry_of(profile_board_t *board, uint8_t input);
 /* Channel number of the output that an entry names; PDCP_NONE: it is missing. */
 uint8_t profile_board_output_of(profile_board_t *board, uint8_t entry);
 
-/* Notes both ends of the entry that the phase is at as its input and output. */
+/* Looks up both ends of the entry that the phase is at: sets input and output. */
 void profile_board_look_at_ends(profile_board_t *board);
 
-/* What is planned ---------------------------------------------------------------------------------------- */
+/* The plan ----------------------------------------------------------------------------------------------- */
 
-/* Is this input to hear the output that an entry names? */
+/* Does the plan give this input the output that an entry names? */
 bool profile_board_hears_output_of(const profile_board_t *board, uint8_t input, uint8_t entry);
 
-/* Another input that wants the output for itself and has it, if this one wants it for itself; PDCP_NONE:
- * there is none. */
+/* Another sole-access input that has the output, if this one is a sole-access input, too; PDCP_NONE: there is
+ * none. */
 uint8_t profile_board_rival_of(profile_board_t *board, uint8_t input, uint8_t output);
 
 /* Gives an input another source, or takes its source away (PDCP_NONE). The input may be PDCP_NONE. */
@@ -190,26 +190,26 @@ void profile_board_set_source(profile_board_t *board, uint8_t input, uint8_t out
  * [PROFILE listing 4.4]. Both must be set up. */
 bool profile_board_may_link(const profile_board_t *board, uint8_t output, uint8_t input);
 
-/* Has an input a source, which is not marked as gone? */
+/* Does an input have a source, and is its link not marked as gone? */
 bool profile_board_is_connected(const profile_board_t *board, uint8_t input);
 
-/* The next unconnected input, behind the last one (PDCP_NONE: the first one), that the link of an input needs
- * (profile_need_t); PDCP_NONE: there are no more. */
+/* The next unconnected input that the link of an input needs (profile_need_t), behind the last one
+ * (PDCP_NONE: the first one); PDCP_NONE: there are no more. */
 uint8_t profile_board_next_need(profile_board_t *board, uint8_t input, uint8_t need, uint8_t last);
 
-/* A link that can be undone, and the undoing of all links behind a mark (a value that `logged` had). */
+/* Makes a link that can be undone. profile_board_undo_to undoes all links made since `logged` was mark. */
 void profile_board_link(profile_board_t *board, uint8_t input, uint8_t output);
 void profile_board_undo_to(profile_board_t *board, uint8_t mark);
 
 /* Does this input stand in for a missing one? */
 bool profile_board_stands_in(profile_board_t *board, uint8_t input);
 
-/* Forgets stand-ins that do not hear what they stand in for any more. */
+/* Forgets stand-ins that no longer hear the output of their entry. */
 void profile_board_forget_stand_ins(profile_board_t *board);
 
 /* Phases ------------------------------------------------------------------------------------------------- */
 
-/* Moves `at` on to the next one of so many entries or inputs; behind the last one it is 0. */
+/* Moves `at` to the next one of count entries or inputs, from the last one back to 0. */
 void profile_board_go_to_next(profile_board_t *board, uint8_t count);
 
 #endif

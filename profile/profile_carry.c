@@ -5,8 +5,7 @@
 #include "profile_active.h"
 #include "profile_match.h"
 
-/* What an input without a link names as its source is not part of the configuration: it shall name none
- * (D-BUS-38). */
+/* An input without a link and without an entry must not name a source (D-BUS-38). */
 static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     profile_end_t source;
@@ -15,7 +14,7 @@ static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t no
     }
 }
 
-/* The link of an input is not to be: what the configuration has rests, what it has not goes. The host sees a
+/* Takes the link of an input away: it rests if the configuration has it, and goes otherwise. The host sees a
  * link of the configuration whose source is missing as inactive (D-BUS-10, D-PRO-15). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
@@ -47,7 +46,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
     }
 }
 
-/* Takes away what is not wanted. */
+/* Takes away all links that the plan does not want. */
 static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
@@ -69,7 +68,7 @@ static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
     return c != PDCP_NONE;
 }
 
-/* Is this a link of the host's, which needs nothing (D-PRO-9)? */
+/* Has the host made this link? Then it needs nothing (D-PRO-9). */
 static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
 {
     const uint8_t entry = profile_active_entry_of(run, input);
@@ -80,8 +79,8 @@ static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
     return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, feed);
 }
 
-/* Does a link work that should not, because something that it requires is not connected? Links that the plan
- * under way has made are left alone: those of a loop would never be made. */
+/* Does this link work although something that it requires is not connected? Links that the plan under way has
+ * made are left alone: otherwise those of a loop would never be made. */
 static bool is_lacking(const profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
@@ -90,8 +89,8 @@ static bool is_lacking(const profile_run_t *run, uint8_t input)
            (misses_something(nodes, feed) || misses_something(nodes, input));
 }
 
-/* A plan may mean to connect what a working link requires, and most often that is done at once. When it does
- * not go well, the link rests meanwhile (D-PRO-9): a device that does not answer may take long, and a hand
+/* Lets links rest that lack something, once the plan has met a link that fails (D-PRO-9). Most often the plan
+ * connects what they lack at once. But a device that does not answer may take long, and meanwhile a hand
  * would obey a controller that hears nothing. True: a link rests now. */
 static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
@@ -112,8 +111,8 @@ static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now
     return rested;
 }
 
-/* The next input whose link is still to be made, terminal ones last; PDCP_NONE: all are made. Ends that have
- * gone since the plan was made are the next plan's business. */
+/* The next input whose link must still be made, terminal ones last; PDCP_NONE: all are made. Ends that have
+ * gone since the plan was made are left to the next plan. */
 static uint8_t next_input(const profile_run_t *run)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;

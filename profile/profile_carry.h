@@ -1,4 +1,4 @@
-/* How a plan becomes bus traffic: links that are not wanted go, then wanted ones are made one after the other
+/* Carries a plan out on the bus: removes links that it does not want, then makes those it wants one by one
  * (D-PRO-5). While links fail, those that require what is not connected rest (D-PRO-9). */
 #ifndef PROFILE_CARRY_H
 #define PROFILE_CARRY_H

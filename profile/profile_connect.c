@@ -3,9 +3,39 @@
 #include "profile_match.h"
 #include "profile_search.h"
 
-enum { CHOOSING = PROFILE_NEEDS_END }; /* the need of a frame whose output is being chosen */
+enum { CHOOSING = PROFILE_NEEDS_END }; /* the need of a frame that has no link yet */
 
-/* The next candidate of the kind of source that the top frame is at; PDCP_NONE: there are no more. */
+/* The output, if it may feed the input of the top frame and was not tried before; PDCP_NONE otherwise. */
+static uint8_t only_source(const profile_board_t *board, uint8_t output)
+{
+    const profile_frame_t *top = &board->connect.top;
+    if (top->tried != PDCP_NONE || output == PDCP_NONE) {
+        return PDCP_NONE;
+    }
+    return profile_board_may_link(board, output, top->input) ? output : (uint8_t)PDCP_NONE;
+}
+
+/* The most similar output to the one that an entry names, if that is missing. */
+static uint8_t next_replacement(profile_board_t *board, uint8_t entry)
+{
+    const profile_frame_t *top = &board->connect.top;
+    if (profile_board_output_of(board, entry) != PDCP_NONE) {
+        return PDCP_NONE;
+    }
+    return profile_search_next(board, top->input, &profile_board_entry(board, entry)->output, top->tried);
+}
+
+static uint8_t next_similar(profile_board_t *board)
+{
+    const profile_frame_t *top = &board->connect.top;
+    const pdcp_channel_t *input = profile_board_channel(board, top->input);
+    profile_ref_t like;
+    like.type = input->type;
+    like.profile = input->profile;
+    return profile_search_next(board, top->input, &like, top->tried);
+}
+
+/* The next candidate for the top frame, of the kind of source that it is at; PDCP_NONE: there are no more. */
 static uint8_t next_source(profile_board_t *board)
 {
     const profile_frame_t *top = &board->connect.top;
@@ -14,29 +44,17 @@ static uint8_t next_source(profile_board_t *board)
         profile_scene_is_awaited(board->scene, &profile_board_entry(board, entry)->output)) {
         return PDCP_NONE; /* its source will be back in a moment */
     }
+    if (top->source == PROFILE_SOURCE_GIVEN) {
+        return only_source(board, board->output);
+    }
     if (top->source == PROFILE_SOURCE_SIMILAR) {
-        profile_ref_t like;
-        like.type = profile_board_channel(board, top->input)->type;
-        like.profile = profile_board_channel(board, top->input)->profile;
-        return profile_search_next(board, top->input, &like, top->tried);
+        return next_similar(board);
     }
-    uint8_t output = board->output;
-    if (top->source != PROFILE_SOURCE_GIVEN) {
-        if (entry == PDCP_NONE) {
-            return PDCP_NONE;
-        }
-        output = profile_board_output_of(board, entry);
+    if (entry == PDCP_NONE) {
+        return PDCP_NONE;
     }
-    if (top->source == PROFILE_SOURCE_REPLACEMENT) {
-        return output != PDCP_NONE
-                   ? PDCP_NONE
-                   : profile_search_next(board, top->input, &profile_board_entry(board, entry)->output,
-                                         top->tried);
-    }
-    if (top->tried == PDCP_NONE && output != PDCP_NONE && profile_board_may_link(board, output, top->input)) {
-        return output;
-    }
-    return PDCP_NONE;
+    return top->source == PROFILE_SOURCE_ORIGINAL ? only_source(board, profile_board_output_of(board, entry))
+                                                  : next_replacement(board, entry);
 }
 
 /* --- Frames: a stack in place of recursion --- */
@@ -70,7 +88,7 @@ static unsigned get_frame(const profile_board_t *board, uint8_t depth)
     return (unsigned)board->below.packed_frames[depth / 2] >> shift_of(depth);
 }
 
-/* Puts an input that the link of the top frame needs on top of it. */
+/* Pushes an input that the link of the top frame needs. */
 static void descend(profile_board_t *board, uint8_t need)
 {
     const profile_frame_t *top = &board->connect.top;
@@ -80,7 +98,7 @@ static void descend(profile_board_t *board, uint8_t need)
     push(board, need, PROFILE_SOURCE_ORIGINAL);
 }
 
-/* Goes back to the frame below, when the top one is done; below the last one the phase goes on. */
+/* Pops the top frame, which is done. Behind the last one the phase goes on. */
 static void ascend(profile_board_t *board)
 {
     profile_frame_t *top = &board->connect.top;
@@ -108,7 +126,7 @@ static bool is_required(uint8_t need)
     return need < PROFILE_DESIRED_BY_OUTPUT;
 }
 
-/* Undoes all that was made for a link that does not hold; its next candidate is due. */
+/* Undoes the link of the top frame with all that was made for it, so that its next candidate is tried. */
 static void reject(profile_board_t *board)
 {
     profile_board_undo_to(board, board->connect.top.mark);

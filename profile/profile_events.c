@@ -25,7 +25,7 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
     run->urgent = urgent;
 }
 
-/* The host has reset a device: it will be back in a moment. */
+/* The host has reset a device, which will be back in a moment. */
 static void on_reset(profile_run_t *run, uint32_t now_ms, const pdcp_event_t *event)
 {
     if (event->status == PDCP_OK) {
@@ -34,7 +34,7 @@ static void on_reset(profile_run_t *run, uint32_t now_ms, const pdcp_event_t *ev
     }
 }
 
-/* Leaves a pair out of plans for a while (D-PRO-14). The oldest of too many is tried again. */
+/* Leaves a pair out of plans for a while (D-PRO-14). If there are too many, the oldest one is tried again. */
 static void ban(profile_run_t *run, uint32_t now_ms, profile_pair_t pair)
 {
     memmove(&run->scene.banned[1], &run->scene.banned[0],
@@ -47,9 +47,9 @@ static void ban(profile_run_t *run, uint32_t now_ms, profile_pair_t pair)
     run->retry_ms = now_ms + PROFILE_RETRY_MS;
 }
 
-/* A link that worked does not any more, and nobody in this layer wanted that: an end is missing, which may
- * have been lost before it beaconed, its device names another source, or does not answer. To make it again
- * counts as its second try in the last case. */
+/* A link has stopped working, and this layer did not ask for that. Either an end is missing (it may
+ * be lost before it ever beaconed), or the device names another source, or it does not answer. If both ends
+ * are there, making the link again counts as the second try. */
 static void on_broken(profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
@@ -61,8 +61,8 @@ static void on_broken(profile_run_t *run, uint8_t input)
     profile_run_make_due(run, run->at_events);
 }
 
-/* A link that this layer has asked for is made, or is not. On a bad line, or when a device was away for a
- * moment, an answer is missing now and then, which must not lead to another limb: it is tried again. */
+/* A link that this layer has asked for was made or has failed. An answer may be missing on a bad line, or
+ * when a device was away for a moment. That must not lead to another limb, so the link is tried again. */
 static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
 {
     run->wishing = false;
@@ -83,7 +83,7 @@ static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
     profile_run_make_due(run, run->what);
 }
 
-/* A link that the host has asked for is made, or is not: what rested for want of it comes back. */
+/* A link that the host has asked for was made or has failed. What rested for lack of it comes back. */
 static void on_hosts_wish(profile_run_t *run, const pdcp_event_t *event)
 {
     if (event->status == PDCP_OK) {
@@ -92,15 +92,15 @@ static void on_hosts_wish(profile_run_t *run, const pdcp_event_t *event)
     }
 }
 
-/* Is the working link of an input another one than the plan knows or wants? */
+/* Does the working link of an input differ from what the plan knows or wants? */
 static bool is_unexpected(const profile_run_t *run, uint8_t input)
 {
     return run->making == PROFILE_MAKING ? profile_plan_links_differ(&run->plan, &run->scene)
                                          : run->scene.nodes->channels[input].feed != run->plan.want[input];
 }
 
-/* An input's device has asked for its link (Update Data Channel). It may lack what it requires, or break sole
- * access: then it does not count as working, and the plan decides. */
+/* A device has asked for the link of its input (Update Data Channel). The link may lack what it requires, so
+ * a plan decides whether it stays. If it breaks sole access, it does not even count as working. */
 static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
@@ -114,7 +114,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
     }
 }
 
-/* The host has taken a link away: it is none of the configuration any more, no plan makes it again, and what
+/* The host has taken a link away. It leaves the configuration, so that no plan makes it again, and what
  * requires its input rests (D-PRO-25). */
 static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 {
@@ -126,9 +126,9 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
     profile_run_make_due(run, PROFILE_PLAN_SETTLE);
 }
 
-/* The audit has let the link of an input go. The pair is left out as one that could not be linked (D-PRO-14),
- * and what requires the input rests (D-BUS-40). Nothing is put in its place: somebody who disturbs a link
- * shall not get another limb by it (D-PRO-26). */
+/* The audit has let the link of an input go. The pair is left out like one that could not be linked
+ * (D-PRO-14), and what requires the input rests (D-BUS-40). Nothing is put in its place: whoever disturbs a
+ * link must not get another limb by it (D-PRO-26). */
 static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 {
     const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
@@ -137,8 +137,8 @@ static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
     profile_run_make_due(run, PROFILE_PLAN_SETTLE);
 }
 
-/* Did the last plan, which is done, want a link that does not work any more? While it is about to be made
- * again, it is not broken. */
+/* Has a link that the finished plan wants stopped working? It is not broken while it is about to be made
+ * again. */
 static bool is_broken(const profile_run_t *run, uint8_t input)
 {
     const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
@@ -146,8 +146,8 @@ static bool is_broken(const profile_run_t *run, uint8_t input)
            channel->link != PDCP_LINK_ACTIVE && (channel->todo & PDCP_TODO_CONNECT) == 0;
 }
 
-/* The link of an input has changed, by whomever. That of a link which this layer has asked for comes with
- * PDCP_EVENT_WISH. */
+/* The link of an input has changed, whoever changed it. The outcome of a link that this layer has asked for
+ * comes with PDCP_EVENT_WISH. */
 static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
     const uint8_t link = run->scene.nodes->channels[input].link;

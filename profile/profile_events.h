@@ -1,5 +1,5 @@
-/* How the profile layer answers what happens on the bus: it makes plans due, and lets the active
- * configuration follow. Nothing is sent here. */
+/* Answers what happens on the bus: makes plans due and changes the active configuration. Nothing is sent
+ * here. */
 #ifndef PROFILE_EVENTS_H
 #define PROFILE_EVENTS_H
 
@@ -8,7 +8,7 @@
 #include "pdcp_arb.h"
 #include "profile_run.h"
 
-/* Takes an event of the arbitrator; hand all of them in. */
+/* Takes an event of the arbitrator. The owner must hand in all of them. */
 void profile_events_take(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
                          const pdcp_event_t *event);
 

@@ -13,8 +13,8 @@ static profile_phase_t go_on(profile_board_t *board)
     return PROFILE_PHASE_ORIGINALS;
 }
 
-/* The rival of the input, if its source only stands in for the one that the configuration names, or the rival
- * itself for another input; PDCP_NONE: there is none. */
+/* The rival of the input, if it must give way: its source stands in for the output of its own entry, or it
+ * stands in for another input itself. PDCP_NONE: there is none. */
 static uint8_t rival_to_go(profile_board_t *board)
 {
     const uint8_t rival = profile_board_rival_of(board, board->input, board->output);
@@ -29,8 +29,9 @@ static uint8_t rival_to_go(profile_board_t *board)
     return rival;
 }
 
-/* Is there something to bring back in this pass: are both ends there, and not linked or stood in for? */
-static bool is_to_come_back(const profile_board_t *board)
+/* Does this pass cover the original, and are both its ends there, but not linked, or one of them stood in
+ * for? */
+static bool can_come_back(const profile_board_t *board)
 {
     const uint8_t input = board->input;
     if (input == PDCP_NONE || board->output == PDCP_NONE) {
@@ -50,7 +51,7 @@ profile_phase_t profile_originals(profile_board_t *board)
         return board->originals.pass == 2 ? PROFILE_PHASE_NEXT_PART : PROFILE_PHASE_ORIGINALS;
     }
     profile_board_look_at_ends(board);
-    if (!is_to_come_back(board)) {
+    if (!can_come_back(board)) {
         return go_on(board);
     }
     profile_board_forget_stand_ins(board);
@@ -64,7 +65,7 @@ profile_phase_t profile_originals(profile_board_t *board)
     return PROFILE_PHASE_ORIGINALS_TAKE;
 }
 
-/* Gives what an original replaces its sources back, or takes them away (PDCP_NONE). */
+/* Gives back the sources of what an original replaces, or takes them away (PDCP_NONE). */
 static void set_replaced(profile_board_t *board, uint8_t output, uint8_t source)
 {
     profile_board_set_source(board, board->originals.rival, output);
@@ -72,7 +73,7 @@ static void set_replaced(profile_board_t *board, uint8_t output, uint8_t source)
     profile_board_set_source(board, board->input, source);
 }
 
-/* What a terminal one needs is searched for; another one must find it connected, or in other originals. */
+/* Only a terminal one may search for what it needs. Others must find it connected, or among originals. */
 profile_phase_t profile_originals_take(profile_board_t *board)
 {
     memcpy(board->scratch.marks.lacking, board->scratch.marks.gone, sizeof board->scratch.marks.lacking);
@@ -83,7 +84,7 @@ profile_phase_t profile_originals_take(profile_board_t *board)
     return PROFILE_PHASE_ORIGINALS_LINK;
 }
 
-/* What the host has made needs nothing (D-PRO-9). */
+/* A link that the host has made needs nothing (D-PRO-9). */
 profile_phase_t profile_originals_link(profile_board_t *board)
 {
     const uint8_t input = board->input;

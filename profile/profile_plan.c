@@ -11,10 +11,10 @@
 
 enum {
     ROUNDS_MAX = 8,
-    ALWAYS = 0x80 /* beside profile_plan_what_t: in every plan */
+    ALWAYS = 0x80 /* a bit beside profile_plan_what_t: in every plan */
 };
 
-/* A hash (FNV-1a) of links tells whether they have changed. */
+/* A hash (FNV-1a) tells whether links have changed. */
 #define HASH_BEGIN 2166136261uL
 
 static uint32_t hash_on(uint32_t hash, uint8_t output)
@@ -93,7 +93,8 @@ static profile_phase_t autoconfigure(profile_board_t *board)
     return PROFILE_PHASE_AUTO;
 }
 
-/* What a plan takes away may make room for what it has passed over: it goes round until nothing changes. */
+/* What a round takes away may make room for what it has passed over, so another one follows until nothing
+ * changes. */
 static profile_phase_t end_round(profile_board_t *board)
 {
     const uint32_t now = hash_planned(board);
@@ -107,7 +108,7 @@ static profile_phase_t end_round(profile_board_t *board)
     return PROFILE_PHASE_NEXT_PART;
 }
 
-/* The next part of the round, of those that are to be planned. */
+/* The next part of the round that is planned. */
 static profile_phase_t next_part(profile_board_t *board)
 {
     static const struct {

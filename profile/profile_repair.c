@@ -6,8 +6,8 @@
 #include "profile_match.h"
 #include "profile_search.h"
 
-/* The missing end of a link that has exactly one, and nothing that stands in for the other; NULL: it is not
- * broken. Notes its ends. */
+/* Looks up the ends of the entry, and returns the missing one if the link is broken and nothing stands in for
+ * it; NULL otherwise. */
 static const profile_ref_t *broken_end(profile_board_t *board)
 {
     const profile_entry_t *entry = profile_board_entry(board, board->at);
@@ -24,7 +24,7 @@ static const profile_ref_t *broken_end(profile_board_t *board)
     return profile_scene_is_awaited(board->scene, missing) ? NULL : missing;
 }
 
-/* How alike the two ends would be with the best replacement, plus 1; 0: there is none. May be
+/* How alike the two ends would be with the best replacement, plus 1; 0: there is none. It may return
  * PROFILE_SEARCH_NOT_YET. */
 static uint8_t repair_key(profile_board_t *board)
 {
@@ -64,7 +64,7 @@ profile_phase_t profile_repair(profile_board_t *board)
     return board->at != 0 ? PROFILE_PHASE_REPAIR : PROFILE_PHASE_REPAIR_CHOOSE;
 }
 
-/* Goes to the entry with the highest key. False: none is to be repaired any more. */
+/* Goes to the entry with the highest key. False: no entry is left to repair. */
 static bool go_to_best(profile_board_t *board)
 {
     uint8_t best_key = 0;
@@ -120,8 +120,8 @@ profile_phase_t profile_repair_link(profile_board_t *board)
     return PROFILE_PHASE_REPAIR_CHOOSE;
 }
 
-/* The input, nobody's, that the output feeds and that is most like the missing one; PDCP_NONE: there is none.
- */
+/* The input without an entry that hears the output and is most like the missing one; PDCP_NONE: there is
+ * none. */
 static uint8_t fed_instead(profile_board_t *board)
 {
     const profile_ref_t *missing = &profile_board_entry(board, board->at)->input;
@@ -136,8 +136,8 @@ static uint8_t fed_instead(profile_board_t *board)
     return board->search.best;
 }
 
-/* An output whose input is missing may have been connected as what a replacement requires: it stands in, too,
- * and goes when the original comes back. */
+/* An output whose input is missing may have been linked to what a replacement requires. That input stands in,
+ * too, and goes when the original comes back. */
 profile_phase_t profile_repair_name(profile_board_t *board)
 {
     uint8_t *stand_in = &board->stand_in[board->at];

@@ -1,8 +1,8 @@
-/* Replacements for missing ends of the active configuration [PROFILE listing 4.6] (D-PRO-10).
+/* Replaces missing ends of the active configuration [PROFILE listing 4.6] (D-PRO-10).
  *
- * Of the links that have exactly one end, those whose repaired ends would be most alike are repaired first.
- * An input may get another source, or an output another input, which stands in for the missing one. Each
- * function is the phase of its name. */
+ * A link is broken if exactly one of its ends is there. An input then gets another source, or an output
+ * another input, which stands in for the missing one. The links whose ends would be most alike are repaired
+ * first. Each function is the phase of its name. */
 #ifndef PROFILE_REPAIR_H
 #define PROFILE_REPAIR_H
 
@@ -11,16 +11,16 @@
 /* Finds out how good a replacement the entry could get. */
 profile_phase_t profile_repair(profile_board_t *board);
 
-/* Chooses the entry that is repaired next. */
+/* Chooses the entry to repair next. */
 profile_phase_t profile_repair_choose(profile_board_t *board);
 
-/* Tries the next input that may stand in. */
+/* Tries the next input that could stand in. */
 profile_phase_t profile_repair_input(profile_board_t *board);
 
-/* Notes whether it does. */
+/* Notes whether it stands in now. */
 profile_phase_t profile_repair_link(profile_board_t *board);
 
-/* Names an input as the stand-in that is one without being known as such. */
+/* Finds an input that stands in without being known to. */
 profile_phase_t profile_repair_name(profile_board_t *board);
 
 #endif

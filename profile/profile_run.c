@@ -31,8 +31,8 @@ void profile_run_stir(profile_run_t *run, uint32_t now_ms)
     profile_run_make_due(run, run->at_events);
 }
 
-/* What the plan under way was about to take away does not count as working for the next one, which would not
- * know any more that it only stood in. */
+/* Links that the plan under way was about to take away do not count as working for the next one. It would not
+ * know that they only stood in. */
 static void leave_unwanted(profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
@@ -55,7 +55,7 @@ static void begin_plan(profile_run_t *run)
     run->stale = true;
 }
 
-/* Only links that the host has made count as working: all others are planned anew. */
+/* Only links that the host has made count as working, so that all others are planned again. */
 static void forget_working(profile_run_t *run)
 {
     memset(run->scene.made, 0xFF, sizeof run->scene.made);

@@ -5,8 +5,8 @@
  * makes the plan that is due and lets profile_carry.h carry it out. profile_active.h keeps the active
  * configuration; what the layer knows of stored configurations its owner tells it.
  *
- * A link that cannot be made is banned and the plan is made anew, without what the failed one has made
- * (D-PRO-5). When the tables change before a plan is done, it is begun anew (D-PRO-23). */
+ * A link that cannot be made is banned, and the plan is made again without it and without what was made for
+ * it (D-PRO-5). If the tables change before a plan is done, it is begun again (D-PRO-23). */
 #ifndef PROFILE_RUN_H
 #define PROFILE_RUN_H
 
@@ -18,11 +18,11 @@
 #include "profile_plan.h"
 
 enum {
-    PROFILE_QUIET_MS = 500,   /* start-up waits until nothing has been bound or set up for so long */
+    PROFILE_QUIET_MS = 500,   /* the start-up waits until nothing was bound or set up for so long */
     PROFILE_ARRIVAL_MS = 500, /* the plan for a new device waits so long for others that are being set up */
-    PROFILE_RESET_MS = 3000,  /* a device that the host has reset is not lost so soon (profile-layer.md 4) */
-    PROFILE_TRIES_MAX = 3,    /* of a link whose device does not answer, before the next candidate is tried */
-    PROFILE_RETRY_MS = 5000   /* links that could not be made are tried again */
+    PROFILE_RESET_MS = 3000,  /* a device that the host has reset may be away so long (profile-layer.md 4) */
+    PROFILE_TRIES_MAX = 3,    /* tries of a link whose device does not answer, before the next candidate */
+    PROFILE_RETRY_MS = 5000   /* links that could not be made are tried again after so long */
 };
 
 typedef enum {
@@ -31,7 +31,7 @@ typedef enum {
     PROFILE_RUNNING = 2
 } profile_state_t;
 
-/* How a plan is being made; not 0: the next step goes on without delay (D-PRO-23). */
+/* How far the making of a plan is. If it is not 0, the next step must follow without delay (D-PRO-23). */
 typedef enum {
     PROFILE_NOT_MAKING = 0,
     PROFILE_MAKING,   /* slice by slice */
@@ -41,8 +41,7 @@ typedef enum {
 /* Small state stands first: on the smallest part, a field that lies farther than 511 bytes from the beginning
  * costs twice the instructions. */
 typedef struct {
-    profile_scene_t scene; /* made: inputs linked by the plan under way; awaited: devices that
-                              the host has reset */
+    profile_scene_t scene; /* made: inputs linked by the plan under way; awaited: devices that were reset */
     uint8_t dropping[PROFILE_CHANNEL_BYTES]; /* bit per input: this layer is taking its link away */
     uint8_t tries;                           /* number of times that the link being made was tried before */
     uint8_t state;                           /* profile_state_t */
@@ -72,19 +71,19 @@ void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t no
 /* Is a plan due or being carried out? */
 bool profile_run_is_busy(const profile_run_t *run);
 
-/* Begins a plan, profile_plan_what_t bits. anew: from nothing but the links that the host has made, others
- * that are not in the configuration go; else from the links that work. */
+/* Begins a plan, profile_plan_what_t bits. It starts from the links that work; with `anew` only from those
+ * that the host has made, so that others that are not in the configuration go. */
 void profile_run_begin(profile_run_t *run, uint8_t what, bool anew);
 
 /* For the other files of the layer ----------------------------------------------------------------------- */
 
-/* Makes a plan due at once, for what is due already and this. Before the start-up it does nothing. */
+/* Makes a plan due at once, for this and for what is due already. Before the start-up it does nothing. */
 void profile_run_make_due(profile_run_t *run, uint8_t what);
 
-/* Makes due what events may plan, with all links: devices have come or gone, or links may be tried again. */
+/* Makes due what events may plan, and lifts all bans: devices have come or gone, or a wait is over. */
 void profile_run_stir(profile_run_t *run, uint32_t now_ms);
 
-/* Begins the plan that is due, for what is under way as well. */
+/* Begins the plan that is due, which also covers what the plan under way is for. */
 void profile_run_begin_due(profile_run_t *run);
 
 #endif

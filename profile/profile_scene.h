@@ -1,8 +1,7 @@
-/* What a plan is made from: the tables of the bus, the active configuration, and what is not to be counted
- * on.
+/* What a plan is made from: the bus tables, the active configuration, and what the planner must leave out.
  *
- * Its owner (profile_run.h) keeps it; the planner reads it, and changes nothing of it but the entries of the
- * configuration, when the plan is done. */
+ * The owner (profile_run.h) fills it in. The planner only reads it, until the plan is done: then it changes
+ * entries of the configuration. */
 #ifndef PROFILE_SCENE_H
 #define PROFILE_SCENE_H
 
@@ -18,7 +17,7 @@ enum { PROFILE_BANNED_MAX = 8 };
 #define PROFILE_CHANNEL_BYTES PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)
 #define PROFILE_PLACE_BYTES PDCP_BIT_BYTES(PDCP_DEVICES_MAX)
 
-/* A link that a device has refused or not answered: not planned until the ban is lifted. */
+/* A link that a device has refused or not answered. It is not planned until the ban is lifted. */
 typedef struct {
     uint8_t output;
     uint8_t input;
@@ -26,11 +25,12 @@ typedef struct {
 
 typedef struct {
     const pdcp_nodes_t *nodes;
-    profile_links_t *links; /* changed only when the plan is done: their stand_in, and entries are removed by
-                               PROFILE_PLAN_ENFORCE */
-    uint8_t made[PROFILE_CHANNEL_BYTES];  /* inputs whose links do not count as working: those that the plan
-                                             has made so far */
-    uint8_t awaited[PROFILE_PLACE_BYTES]; /* devices that are away for a moment only and not replaced */
+    profile_links_t *links; /* when the plan is done it sets their stand_in; PROFILE_PLAN_ENFORCE removes
+                               entries */
+    uint8_t made[PROFILE_CHANNEL_BYTES];  /* bit per input: its link does not count as working, such as
+                                             one that the plan under way has made */
+    uint8_t awaited[PROFILE_PLACE_BYTES]; /* bit per place: the device is only away for a moment and keeps
+                                             its links */
     uint8_t banned_count;
     profile_pair_t banned[PROFILE_BANNED_MAX];
 } profile_scene_t;
@@ -38,7 +38,7 @@ typedef struct {
 /* Is the device of an end only away for a moment: awaited, or being set up at this time (D-PRO-13)? */
 bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t *end);
 
-/* Is this pair to be left out of the plan? */
+/* Must the plan leave this pair out? */
 bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8_t input);
 
 /* The output that feeds an input and counts as working; PDCP_NONE: none does. */

@@ -4,7 +4,7 @@
 
 #include "profile_match.h"
 
-/* May this input take the place of a missing one? It must be nobody's. */
+/* May this input take the place of a missing one? It must not be linked, nor have an entry that could be. */
 static bool is_spare(profile_board_t *board, uint8_t input)
 {
     if (board->want[input] != PDCP_NONE) {
@@ -30,8 +30,8 @@ static bool is_candidate(profile_board_t *board, uint8_t partner, uint8_t channe
     return is_spare(board, channel) && profile_board_may_link(board, partner, channel);
 }
 
-/* Channels are searched in the order of their likeness to an end, terminal ones (NULL) in that in which they
- * are served: the highest score first. */
+/* The channel with the highest score comes first: the most similar to an end, or (NULL) the terminal one that
+ * is served first. */
 static uint16_t score_of(const profile_board_t *board, const profile_ref_t *like, uint8_t channel)
 {
     const pdcp_channel_t *entry = profile_board_channel(board, channel);
@@ -63,7 +63,7 @@ void profile_search_begin(profile_board_t *board)
     board->search.left = (uint16_t)((PROFILE_PLAN_STEPS - board->steps) / PROFILE_PLAN_SHARE);
 }
 
-/* Takes the steps of one search off those that are left. False: they are too few. */
+/* Takes the steps of one search off those that are left. False: too few are left. */
 static bool take_steps(profile_board_t *board)
 {
     if (board->search.left < PDCP_CHANNELS_MAX) {

@@ -1,6 +1,6 @@
-/* Searches among all channels: which one comes next that may be linked to a partner (profile-layer.md 4).
+/* Searches among all channels for one that may be linked to a partner (profile-layer.md 4).
  *
- * A search may take several slices; it goes on when it is asked again in the same way. */
+ * A search may take several slices. To continue it, call it again with the same arguments. */
 #ifndef PROFILE_SEARCH_H
 #define PROFILE_SEARCH_H
 
@@ -8,19 +8,19 @@
 
 #include "profile_board.h"
 
-enum { PROFILE_SEARCH_NOT_YET = 0xFE }; /* no channel has this number: the slice is over, ask again */
+enum { PROFILE_SEARCH_NOT_YET = 0xFE }; /* no channel has this number; the slice is over, call again */
 
 /* Grants the searches that follow their share of the steps that are left. */
 void profile_search_begin(profile_board_t *board);
 
-/* Of the channels that may be linked to the partner, the one that comes next behind `tried` in their likeness
- * to an end; without a partner (PDCP_NONE, like NULL) the next terminal one. tried: PDCP_NONE for the first
- * one. Returns PDCP_NONE when there are no more, or PROFILE_SEARCH_NOT_YET. It looks at one channel at least,
- * however short the slice. */
+/* Finds the next candidate behind `tried` (PDCP_NONE: the first one). With a partner, these are the channels
+ * that may be linked to it, the most similar to `like` first. Without one (PDCP_NONE, like NULL), these are
+ * terminal inputs, in the order in which they are served. Returns PDCP_NONE when there are no more, or
+ * PROFILE_SEARCH_NOT_YET. It looks at one channel at least, however short the slice. */
 uint8_t profile_search_next(profile_board_t *board, uint8_t partner, const profile_ref_t *like,
                             uint8_t tried);
 
-/* Notes the channel as the best one so far (search.best) if it is. */
+/* Makes the channel search.best if it is better than the best one so far. */
 void profile_search_compare(profile_board_t *board, const profile_ref_t *like, uint8_t channel);
 
 #endif

@@ -4,15 +4,14 @@
 
 #include "profile_match.h"
 
-/* The entry of an input that hears the output which it names; PDCP_NONE: it has none, or hears another one.
- */
+/* The entry of an input, if the input hears the output that it names; PDCP_NONE otherwise. */
 static uint8_t original_of(profile_board_t *board, uint8_t input)
 {
     const uint8_t entry = profile_board_entry_of(board, input);
     return entry != PDCP_NONE && profile_board_hears_output_of(board, input, entry) ? entry : PDCP_NONE;
 }
 
-/* Does the link of this input lack something that it requires, which takes it away? */
+/* Does the link of this input lack what it requires? A link that the host has made requires nothing. */
 static bool is_lacking(profile_board_t *board, uint8_t input)
 {
     if (!profile_board_is_connected(board, input)) {

@@ -1,4 +1,4 @@
-/* The start-up of a limb (profile-layer.md 4): when it may begin, and how (D-PRO-18). */
+/* Begins the start-up of a limb once the bus is quiet (profile-layer.md 4, D-PRO-18). */
 #ifndef PROFILE_START_H
 #define PROFILE_START_H
 
@@ -8,18 +8,18 @@
 #include "pdcp_arb.h"
 #include "profile_run.h"
 
-/* Goes back to the time before the start-up: the arbitrator has begun anew. The configuration is emptied
+/* Goes back to waiting for the start-up, since the arbitrator has started again. Empties the configuration
  * unless it is frozen. The rest of what a plan is made from is set when one is begun. */
 void profile_start_wait(profile_run_t *run, uint32_t now_ms);
 
-/* Is a device set up, and the start-up still to come? */
+/* Is a device set up, and has the start-up not begun yet? */
 bool profile_start_is_pending(const profile_run_t *run);
 
-/* When there will have been quiet for PROFILE_QUIET_MS, or was. The time by which a grant was held is taken
+/* When the bus will have been quiet for PROFILE_QUIET_MS, or was. The time by which a grant was held is taken
  * off (D-BUS-34). */
 uint32_t profile_start_ms(const profile_run_t *run, const pdcp_arb_t *arb);
 
-/* May the start-up begin: is it pending, no link half made, and has there been quiet for long enough? */
+/* May the start-up begin? It must be pending, with no link half made and the bus quiet for long enough. */
 bool profile_start_may_begin(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms);
 
 /* Begins the start-up. stored: a stored configuration has been loaded. Otherwise the configuration is read

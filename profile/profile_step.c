@@ -6,8 +6,8 @@
 #include "profile_carry.h"
 #include "profile_start.h"
 
-/* Makes a slice of the plan, of a new one if what it is made from has changed. Nothing of it counts before it
- * is done. */
+/* Makes a slice of the plan, or of a new one if what it is made from has changed. Nothing of a plan counts
+ * before it is done. */
 static void make_slice(profile_run_t *run)
 {
     if (run->stale || profile_plan_is_stale(&run->plan, &run->scene)) {
@@ -28,7 +28,8 @@ static bool has_awaited(const profile_run_t *run)
     return all != 0;
 }
 
-/* When a plan is due though nothing happens: a device is awaited no longer, or links are tried again. */
+/* When a plan is due although nothing happens: the wait for a device is over, or banned links are tried
+ * again. */
 static uint32_t alarm_ms(const profile_run_t *run, uint32_t now_ms)
 {
     uint32_t next_ms = now_ms + PDCP_TIME_FAR_MS;
@@ -47,8 +48,8 @@ static bool awaits_arrivals(const profile_run_t *run, const pdcp_arb_t *arb, uin
     return !run->urgent && pdcp_arb_setup_running(arb) && pdcp_time_before(now_ms, run->arrival_ms);
 }
 
-/* What the host has asked for is finished first: an action, or a link. A plan made while a link is half made
- * would take it away again when it is whole; it could not be carried out earlier anyway (D-PRO-27). */
+/* An action or a link that the host has asked for is finished first. A plan made while a link is half made
+ * would take it away again when it is whole, and could not be carried out earlier anyway (D-PRO-27). */
 static bool is_held_back(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms)
 {
     return run->what == PROFILE_PLAN_ENFORCE || pdcp_arb_link_running(arb) ||

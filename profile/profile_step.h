@@ -1,4 +1,4 @@
-/* The clock of the profile layer: makes the plan that is due, slice by slice, and lets it be carried out. */
+/* Lets the profile layer work: makes the plan that is due, slice by slice, and has it carried out. */
 #ifndef PROFILE_STEP_H
 #define PROFILE_STEP_H
 

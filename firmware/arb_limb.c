@@ -5,8 +5,8 @@
 
 #include "pdcp_time.h"
 #include "profile_active.h"
+#include "profile_channel.h"
 #include "profile_events.h"
-#include "profile_match.h"
 #include "profile_start.h"
 #include "profile_step.h"
 
@@ -139,7 +139,7 @@ static bool is_present(const pdcp_nodes_t *nodes, const profile_end_t *end, uint
 {
     const uint8_t place = pdcp_nodes_find(nodes, &end->owner);
     return place != PDCP_NONE &&
-           profile_is_ready(nodes, pdcp_nodes_channel(nodes, place, end->index), transfer);
+           profile_channel_is_ready(nodes, pdcp_nodes_channel(nodes, place, end->index), transfer);
 }
 
 /* Is the configuration just read better than the best one so far (D-PRO-4)? One without a link that has an

@@ -3,7 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "profile_match.h"
+#include "profile_channel.h"
 
 uint8_t profile_board_entry_of(profile_board_t *board, uint8_t input)
 {
@@ -37,12 +37,13 @@ bool profile_board_hears_output_of(const profile_board_t *board, uint8_t input, 
 
 uint8_t profile_board_rival_of(profile_board_t *board, uint8_t input, uint8_t output)
 {
-    if (output == PDCP_NONE || !profile_is_sole(profile_board_channel(board, input))) {
+    if (output == PDCP_NONE || !profile_channel_is_sole(profile_board_channel(board, input))) {
         return PDCP_NONE;
     }
     board->left -= PROFILE_EFFORT_SCAN;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (board->want[i] == output && i != input && profile_is_sole(profile_board_channel(board, i))) {
+        if (board->want[i] == output && i != input &&
+            profile_channel_is_sole(profile_board_channel(board, i))) {
             return i;
         }
     }
@@ -56,7 +57,7 @@ void profile_board_set_source(profile_board_t *board, uint8_t input, uint8_t out
     }
     const uint8_t old = board->want[input];
     board->want[input] = output;
-    if (!profile_is_sole(profile_board_channel(board, input))) {
+    if (!profile_channel_is_sole(profile_board_channel(board, input))) {
         return;
     }
     if (old != PDCP_NONE && profile_board_rival_of(board, input, old) == PDCP_NONE) {
@@ -71,7 +72,7 @@ bool profile_board_may_link(const profile_board_t *board, uint8_t output, uint8_
 {
     const pdcp_channel_t *to = profile_board_channel(board, input);
     if (profile_scene_is_banned(board->scene, output, input) ||
-        (profile_is_sole(to) && pdcp_bit(board->taken, output))) {
+        (profile_channel_is_sole(to) && pdcp_bit(board->taken, output))) {
         return false;
     }
     return profile_board_channel(board, output)->node != to->node;

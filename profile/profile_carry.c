@@ -3,13 +3,13 @@
 #include <string.h>
 
 #include "profile_active.h"
-#include "profile_match.h"
+#include "profile_channel.h"
 
 /* An input without a link and without an entry must not name a source (D-BUS-38). */
 static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     profile_end_t source;
-    if (profile_source_of(run->scene.nodes, input, &source)) {
+    if (profile_channel_source(run->scene.nodes, input, &source)) {
         pdcp_arb_forget_source(arb, now_ms, input);
     }
 }
@@ -50,7 +50,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
 static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (run->plan.want[i] == PDCP_NONE && profile_is_ready(run->scene.nodes, i, PDCP_INPUT)) {
+        if (run->plan.want[i] == PDCP_NONE && profile_channel_is_ready(run->scene.nodes, i, PDCP_INPUT)) {
             unlink_one(run, arb, now_ms, i);
         }
     }
@@ -61,7 +61,7 @@ static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
 {
     const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
     uint8_t c = owner->needs_stride != 0 ? owner->first_channel : (uint8_t)PDCP_NONE;
-    while (c != PDCP_NONE && (profile_feed(nodes, c) != PDCP_NONE ||
+    while (c != PDCP_NONE && (profile_channel_feed(nodes, c) != PDCP_NONE ||
                               !pdcp_nodes_needs(nodes, channel, false, nodes->channels[c].index))) {
         c = nodes->channels[c].next;
     }
@@ -84,7 +84,7 @@ static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
 static bool is_lacking(const profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
-    const uint8_t feed = profile_feed(nodes, input);
+    const uint8_t feed = profile_channel_feed(nodes, input);
     return feed != PDCP_NONE && !pdcp_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
            (misses_something(nodes, feed) || misses_something(nodes, input));
 }
@@ -120,11 +120,12 @@ static uint8_t next_input(const profile_run_t *run)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t output = run->plan.want[i];
         const pdcp_channel_t *channel = &nodes->channels[i];
-        if (!profile_is_ready(nodes, output, PDCP_OUTPUT) || !profile_is_ready(nodes, i, PDCP_INPUT) ||
+        if (!profile_channel_is_ready(nodes, output, PDCP_OUTPUT) ||
+            !profile_channel_is_ready(nodes, i, PDCP_INPUT) ||
             (channel->link == PDCP_LINK_ACTIVE && channel->feed == output)) {
             continue;
         }
-        if (!profile_is_terminal(channel)) {
+        if (!profile_channel_is_terminal(channel)) {
             return i;
         }
         if (found == PDCP_NONE) {

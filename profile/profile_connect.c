@@ -1,6 +1,5 @@
 #include "profile_connect.h"
 
-#include "profile_match.h"
 #include "profile_search.h"
 
 enum { CHOOSING = PROFILE_NEEDS_END }; /* the need of a frame that has no link yet */

@@ -3,7 +3,7 @@
 #include <string.h>
 
 #include "profile_active.h"
-#include "profile_match.h"
+#include "profile_channel.h"
 #include "profile_start.h"
 
 static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
@@ -54,8 +54,8 @@ static void on_broken(profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
     run->plan.want[input] = PDCP_NONE;
-    if (profile_is_ready(nodes, input, PDCP_INPUT) &&
-        profile_is_ready(nodes, nodes->channels[input].feed, PDCP_OUTPUT)) {
+    if (profile_channel_is_ready(nodes, input, PDCP_INPUT) &&
+        profile_channel_is_ready(nodes, nodes->channels[input].feed, PDCP_OUTPUT)) {
         run->tries = 1;
     }
     profile_run_make_due(run, run->at_events);
@@ -109,7 +109,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
         (void)profile_active_adopt(run, input, false);
     }
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
-        pdcp_set_bit(run->scene.made, input, profile_breaks_sole_access(nodes, channel->feed, input));
+        pdcp_set_bit(run->scene.made, input, profile_channel_breaks_sole_access(nodes, channel->feed, input));
         profile_run_make_due(run, run->at_events);
     }
 }

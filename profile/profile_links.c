@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "pdcp_bits.h"
+#include "profile_channel.h"
 #include "profile_match.h"
 #include "profile_type.h"
 
@@ -55,8 +56,8 @@ static profile_entry_t *insert(profile_links_t *links, const profile_end_t *inpu
 {
     profile_entry_t *entry = &links->entries[links->count++];
     while (entry > links->entries &&
-           profile_precedes(input->profile, &input->owner, input->index, entry[-1].input.profile,
-                            owner_of(links, &entry[-1].input), entry[-1].input.index)) {
+           profile_match_precedes(input->profile, &input->owner, input->index, entry[-1].input.profile,
+                                  owner_of(links, &entry[-1].input), entry[-1].input.index)) {
         entry[0] = entry[-1];
         entry--;
     }
@@ -179,38 +180,5 @@ uint8_t profile_links_channel(const profile_links_t *links, const pdcp_nodes_t *
         return PDCP_NONE;
     }
     const uint8_t channel = pdcp_nodes_channel(nodes, place, end->index);
-    return profile_is_ready(nodes, channel, transfer) ? channel : PDCP_NONE;
-}
-
-void profile_end_of(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end)
-{
-    const pdcp_channel_t *entry = &nodes->channels[channel];
-    const pdcp_node_t *node = &nodes->nodes[entry->node];
-    end->owner = node->identity;
-    end->owner_type = node->type;
-    end->owner_profile = node->profile;
-    end->type = entry->type;
-    end->profile = entry->profile;
-    end->index = entry->index;
-}
-
-bool profile_source_of(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end)
-{
-    const pdcp_channel_t *entry = &nodes->channels[input];
-    if (entry->source_index == PDCP_NO_SOURCE_INDEX || entry->source_index == 0) {
-        return false;
-    }
-    const uint8_t place = pdcp_nodes_find(nodes, &entry->source);
-    end->owner = entry->source;
-    end->owner_type = 0;
-    end->owner_profile = 0;
-    if (place != PDCP_NONE) {
-        const pdcp_node_t *owner = &nodes->nodes[place];
-        end->owner_type = owner->type;
-        end->owner_profile = owner->profile;
-    }
-    end->type = entry->source_type;
-    end->profile = entry->source_profile;
-    end->index = entry->source_index;
-    return true;
+    return profile_channel_is_ready(nodes, channel, transfer) ? channel : PDCP_NONE;
 }

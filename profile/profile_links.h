@@ -79,10 +79,4 @@ uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *no
 uint8_t profile_links_channel(const profile_links_t *links, const pdcp_nodes_t *nodes,
                               const profile_ref_t *end, uint8_t transfer);
 
-/* A channel of the tables as the end of a link. */
-void profile_end_of(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end);
-
-/* The source that an input of the tables names, which need not be there. False: it names none. */
-bool profile_source_of(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end);
-
 #endif

@@ -5,7 +5,7 @@
 #define COMPONENT_BITS 4u
 #define FIRST_COMPONENT 0xF000u
 
-uint8_t profile_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b)
+uint8_t profile_match_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b)
 {
     const uint16_t types = type_a ^ type_b; /* bits that differ */
     const uint16_t profiles = profile_a ^ profile_b;
@@ -27,23 +27,8 @@ uint8_t profile_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b,
     return score;
 }
 
-bool profile_is_sole(const pdcp_channel_t *channel)
-{
-    return (channel->type & PROFILE_TYPE_SOLE) != 0;
-}
-
-bool profile_is_terminal(const pdcp_channel_t *channel)
-{
-    return (channel->type & PROFILE_TYPE_TERMINAL) != 0;
-}
-
-uint16_t profile_priority(const pdcp_channel_t *channel)
-{
-    return channel->terminal_profile != 0 ? channel->terminal_profile : channel->profile;
-}
-
-bool profile_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index, uint16_t than_profile,
-                      const pdcp_identity_t *than_owner, uint8_t than_index)
+bool profile_match_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index,
+                            uint16_t than_profile, const pdcp_identity_t *than_owner, uint8_t than_index)
 {
     if (profile != than_profile) {
         return profile < than_profile;
@@ -60,41 +45,10 @@ bool profile_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t in
     return index < than_index;
 }
 
-bool profile_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b)
+bool profile_match_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b)
 {
     const pdcp_channel_t *first = &nodes->channels[a];
     const pdcp_channel_t *second = &nodes->channels[b];
-    return profile_precedes(first->profile, &nodes->nodes[first->node].identity, first->index,
-                            second->profile, &nodes->nodes[second->node].identity, second->index);
-}
-
-bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer)
-{
-    if (channel == PDCP_NONE) {
-        return false;
-    }
-    const pdcp_channel_t *entry = &nodes->channels[channel];
-    return entry->transfer == transfer && /* a free entry of the pool has none */
-           nodes->nodes[entry->node].state == PDCP_NODE_READY;
-}
-
-uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input)
-{
-    const pdcp_channel_t *channel = &nodes->channels[input];
-    return channel->link == PDCP_LINK_ACTIVE && profile_is_ready(nodes, input, PDCP_INPUT) ? channel->feed
-                                                                                           : PDCP_NONE;
-}
-
-bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
-{
-    if (!profile_is_sole(&nodes->channels[input])) {
-        return false;
-    }
-    const pdcp_channel_t *channel = nodes->channels;
-    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
-        if (i != input && profile_feed(nodes, i) == output && profile_is_sole(channel)) {
-            return true;
-        }
-    }
-    return false;
+    return profile_match_precedes(first->profile, &nodes->nodes[first->node].identity, first->index,
+                                  second->profile, &nodes->nodes[second->node].identity, second->index);
 }

@@ -12,31 +12,14 @@
 
 /* 8 for each equal component of the profiles from the root on, then 4 for equal control mode, 2 for equal
  * data type, 1 for equal byte size: 0 to 39. Less than PROFILE_CANDIDATE_MIN: no candidates. */
-uint8_t profile_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b);
-
-/* Flags of a channel's type. */
-bool profile_is_sole(const pdcp_channel_t *channel);
-bool profile_is_terminal(const pdcp_channel_t *channel);
-
-/* The profile that a terminal channel is served by, lowest first: its terminal profile, its own if that is 0
- * (D-PRO-3). */
-uint16_t profile_priority(const pdcp_channel_t *channel);
+uint8_t profile_match_similarity(uint16_t type_a, uint16_t profile_a, uint16_t type_b, uint16_t profile_b);
 
 /* Is channel a before channel b: lower profile, then lower VID, PID, SN, index? The order of channels that
  * are equally alike; it does not depend on where they stand in the tables (D-PRO-3). */
-bool profile_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b);
+bool profile_match_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b);
 
 /* The same for a channel with this profile, owner and index and another one. */
-bool profile_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index, uint16_t than_profile,
-                      const pdcp_identity_t *than_owner, uint8_t than_index);
-
-/* Is this channel on a device that is set up, and has it this direction (PDCP_INPUT, PDCP_OUTPUT)? */
-bool profile_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
-
-/* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
-uint8_t profile_feed(const pdcp_nodes_t *nodes, uint8_t input);
-
-/* Would the link give an output a second sole-access input, as the tables are? */
-bool profile_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
+bool profile_match_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index,
+                            uint16_t than_profile, const pdcp_identity_t *than_owner, uint8_t than_index);
 
 #endif

@@ -2,8 +2,8 @@
 
 #include <string.h>
 
+#include "profile_channel.h"
 #include "profile_connect.h"
-#include "profile_match.h"
 #include "profile_settle.h"
 
 /* Goes to the next entry. */
@@ -37,7 +37,7 @@ static bool can_come_back(const profile_board_t *board)
     if (input == PDCP_NONE || board->output == PDCP_NONE) {
         return false;
     }
-    if (profile_is_terminal(profile_board_channel(board, input)) != board->originals.pass) {
+    if (profile_channel_is_terminal(profile_board_channel(board, input)) != board->originals.pass) {
         return false;
     }
     return board->want[input] != board->output || board->stand_in[board->at] != PDCP_NONE;
@@ -78,7 +78,7 @@ profile_phase_t profile_originals_take(profile_board_t *board)
 {
     memcpy(board->scratch.marks.lacking, board->scratch.marks.gone, sizeof board->scratch.marks.lacking);
     set_replaced(board, PDCP_NONE, PDCP_NONE);
-    const bool searches = profile_is_terminal(profile_board_channel(board, board->input));
+    const bool searches = profile_channel_is_terminal(profile_board_channel(board, board->input));
     profile_connect_begin(board, PROFILE_SOURCE_GIVEN,
                           searches ? PROFILE_SOURCE_SIMILAR : PROFILE_SOURCE_ORIGINAL);
     return PROFILE_PHASE_ORIGINALS_LINK;

@@ -45,7 +45,7 @@ static uint8_t repair_key(profile_board_t *board)
     }
     const pdcp_channel_t *one = profile_board_channel(board, partner);
     const pdcp_channel_t *other = profile_board_channel(board, best);
-    return (uint8_t)(profile_similarity(one->type, one->profile, other->type, other->profile) + 1u);
+    return (uint8_t)(profile_match_similarity(one->type, one->profile, other->type, other->profile) + 1u);
 }
 
 profile_phase_t profile_repair(profile_board_t *board)

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "profile_match.h"
+#include "profile_channel.h"
 
 void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms)
 {
@@ -36,7 +36,7 @@ void profile_run_stir(profile_run_t *run, uint32_t now_ms)
 static void leave_unwanted(profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const uint8_t feed = profile_feed(run->scene.nodes, i);
+        const uint8_t feed = profile_channel_feed(run->scene.nodes, i);
         if (feed != PDCP_NONE && feed != run->plan.want[i]) {
             pdcp_set_bit(run->scene.made, i, true);
         }

@@ -1,6 +1,6 @@
 #include "profile_scene.h"
 
-#include "profile_match.h"
+#include "profile_channel.h"
 
 bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
 {
@@ -28,8 +28,8 @@ bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8
 
 uint8_t profile_scene_feed(const profile_scene_t *scene, uint8_t input)
 {
-    const uint8_t feed = profile_feed(scene->nodes, input);
-    if (!profile_is_ready(scene->nodes, feed, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
+    const uint8_t feed = profile_channel_feed(scene->nodes, input);
+    if (!profile_channel_is_ready(scene->nodes, feed, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
         return PDCP_NONE;
     }
     return feed;

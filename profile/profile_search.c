@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "profile_channel.h"
 #include "profile_match.h"
 
 /* May this input take the place of a missing one? It must not be linked, nor have an entry that could be. */
@@ -18,14 +19,14 @@ static bool is_spare(profile_board_t *board, uint8_t input)
 static bool is_candidate(profile_board_t *board, uint8_t partner, uint8_t channel)
 {
     if (partner != PDCP_NONE && profile_board_channel(board, partner)->transfer == PDCP_INPUT) {
-        return profile_is_ready(board->nodes, channel, PDCP_OUTPUT) &&
+        return profile_channel_is_ready(board->nodes, channel, PDCP_OUTPUT) &&
                profile_board_may_link(board, channel, partner);
     }
-    if (!profile_is_ready(board->nodes, channel, PDCP_INPUT)) {
+    if (!profile_channel_is_ready(board->nodes, channel, PDCP_INPUT)) {
         return false;
     }
     if (partner == PDCP_NONE) {
-        return profile_is_terminal(profile_board_channel(board, channel));
+        return profile_channel_is_terminal(profile_board_channel(board, channel));
     }
     return is_spare(board, channel) && profile_board_may_link(board, partner, channel);
 }
@@ -35,15 +36,15 @@ static bool is_candidate(profile_board_t *board, uint8_t partner, uint8_t channe
 static uint16_t score_of(const profile_board_t *board, const profile_ref_t *like, uint8_t channel)
 {
     const pdcp_channel_t *entry = profile_board_channel(board, channel);
-    return like != NULL ? profile_similarity(entry->type, entry->profile, like->type, like->profile)
-                        : (uint16_t)~profile_priority(entry);
+    return like != NULL ? profile_match_similarity(entry->type, entry->profile, like->type, like->profile)
+                        : (uint16_t)~profile_channel_priority(entry);
 }
 
 static bool comes_before(const profile_board_t *board, const profile_ref_t *like, uint8_t a, uint8_t b)
 {
     const uint16_t first = score_of(board, like, a);
     const uint16_t second = score_of(board, like, b);
-    return first != second ? first > second : profile_is_before(board->nodes, a, b);
+    return first != second ? first > second : profile_match_is_before(board->nodes, a, b);
 }
 
 void profile_search_compare(profile_board_t *board, const profile_ref_t *like, uint8_t channel)

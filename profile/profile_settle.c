@@ -77,7 +77,7 @@ profile_phase_t profile_settle_enforce(profile_board_t *board)
 {
     const uint8_t rival = profile_board_rival_of(board, board->at, board->want[board->at]);
     if (rival != PDCP_NONE) {
-        const uint8_t last = profile_is_before(board->nodes, rival, board->at) ? board->at : rival;
+        const uint8_t last = profile_match_is_before(board->nodes, rival, board->at) ? board->at : rival;
         profile_board_set_source(board, last, PDCP_NONE);
         pdcp_set_bit(board->scratch.marks.gone, last, true);
         return PROFILE_PHASE_ENFORCE;

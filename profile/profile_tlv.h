@@ -16,7 +16,6 @@
 
 #include "pdcp_bits.h"
 #include "profile_config.h"
-#include "profile_match.h"
 
 /* Codes [PROFILE table 4.1]. */
 enum {

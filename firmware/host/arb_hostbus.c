@@ -3,7 +3,6 @@
 
 #include "arb_hostcall.h"
 #include "pdcp_time.h"
-#include "profile_match.h"
 
 enum { PASSTHROUGH = 15 }; /* bytes of the payload: dev, DLC, data */
 

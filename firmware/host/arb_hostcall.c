@@ -1,7 +1,7 @@
 #include "arb_hostcall.h"
 
 #include "pdcp_time.h"
-#include "profile_match.h"
+#include "profile_channel.h"
 
 uint8_t arb_call_started(arb_call_t *call)
 {
@@ -48,7 +48,7 @@ uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t number = pdcp_nodes_channel(nodes, call->place[end], call->payload[7 * end + 6]);
-    return profile_is_ready(nodes, number, transfer) ? number : PDCP_NONE;
+    return profile_channel_is_ready(nodes, number, transfer) ? number : PDCP_NONE;
 }
 
 uint8_t arb_call_error(int8_t status)

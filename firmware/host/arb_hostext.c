@@ -4,7 +4,7 @@
 
 #include "arb_hostcall.h"
 #include "arb_version.h"
-#include "profile_match.h"
+#include "profile_channel.h"
 
 /* 2401h */
 uint8_t arb_hostext_arbitrator_info(arb_call_t *call)
@@ -132,7 +132,8 @@ uint8_t arb_hostext_remove_link(arb_call_t *call)
     arb_turn_t *turn = &call->api->turn;
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (turn->started) {
-        if (!profile_is_ready(nodes, turn->channel, PDCP_INPUT) || !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
+        if (!profile_channel_is_ready(nodes, turn->channel, PDCP_INPUT) ||
+            !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
             return ARB_ERR_NO_ANSWER;
         }
         return nodes->channels[turn->channel].link == PDCP_LINK_NONE ? arb_call_error(turn->status)

@@ -4,6 +4,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "profile_channel.h"
 #include "unity.h"
 
 void systems_init(systems_t *s)
@@ -235,8 +236,8 @@ void systems_forget(systems_t *s, uint8_t place)
 static void put_entry(systems_t *s, uint8_t output, uint8_t input, bool by_host)
 {
     profile_link_t link;
-    profile_end_of(&s->nodes, output, &link.output);
-    profile_end_of(&s->nodes, input, &link.input);
+    profile_channel_end(&s->nodes, output, &link.output);
+    profile_channel_end(&s->nodes, input, &link.input);
     TEST_ASSERT_TRUE(profile_links_put(&s->links, &link, by_host));
 }
 

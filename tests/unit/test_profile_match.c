@@ -1,4 +1,5 @@
 /* Similarity and order of channels by hand, from profile-layer.md 3 and [PROFILE listing 4.9]. */
+#include "profile_channel.h"
 #include "profile_match.h"
 #include "systems.h"
 #include "unity.h"
@@ -14,8 +15,8 @@ void tearDown(void) {}
 
 static void check_both_ways(uint8_t expected, uint16_t type_a, uint16_t a, uint16_t type_b, uint16_t b)
 {
-    TEST_ASSERT_EQUAL_UINT8(expected, profile_similarity(type_a, a, type_b, b));
-    TEST_ASSERT_EQUAL_UINT8(expected, profile_similarity(type_b, b, type_a, a));
+    TEST_ASSERT_EQUAL_UINT8(expected, profile_match_similarity(type_a, a, type_b, b));
+    TEST_ASSERT_EQUAL_UINT8(expected, profile_match_similarity(type_b, b, type_a, a));
 }
 
 static void test_each_equal_component_counts_8(void)
@@ -61,8 +62,8 @@ static void test_flags_prescaler_and_unused_bits_do_not_count(void)
 /* D-PRO-3: an equal root is enough, an equal type is not. */
 static void test_the_least_alike_candidates(void)
 {
-    TEST_ASSERT_EQUAL_UINT8(PROFILE_CANDIDATE_MIN, profile_similarity(0x5000, 0x2120, 0xE400, 0x2200));
-    TEST_ASSERT_LESS_THAN(PROFILE_CANDIDATE_MIN, profile_similarity(0x5000, 0x2120, 0x5000, 0x1120));
+    TEST_ASSERT_EQUAL_UINT8(PROFILE_CANDIDATE_MIN, profile_match_similarity(0x5000, 0x2120, 0xE400, 0x2200));
+    TEST_ASSERT_LESS_THAN(PROFILE_CANDIDATE_MIN, profile_match_similarity(0x5000, 0x2120, 0x5000, 0x1120));
 }
 
 static void test_flags_of_the_type(void)
@@ -72,25 +73,25 @@ static void test_flags_of_the_type(void)
     static const bool terminal[] = {false, true, true, false, false};
     for (uint8_t i = 0; i < 5; i++) {
         const pdcp_channel_t *channel = &s.nodes.channels[pdcp_nodes_channel(&s.nodes, 0, (uint8_t)(i + 1))];
-        TEST_ASSERT_EQUAL(sole[i], profile_is_sole(channel));
-        TEST_ASSERT_EQUAL(terminal[i], profile_is_terminal(channel));
+        TEST_ASSERT_EQUAL(sole[i], profile_channel_is_sole(channel));
+        TEST_ASSERT_EQUAL(terminal[i], profile_channel_is_terminal(channel));
     }
 }
 
 static void test_the_terminal_profile_is_the_priority(void)
 {
     systems_add(&s, "D1 in 1 5300 2110 for 1220, in 2 5300 2110");
-    TEST_ASSERT_EQUAL_HEX16(0x1220, profile_priority(&s.nodes.channels[systems_channel(&s, "1.1")]));
-    TEST_ASSERT_EQUAL_HEX16(0x2110, profile_priority(&s.nodes.channels[systems_channel(&s, "1.2")]));
+    TEST_ASSERT_EQUAL_HEX16(0x1220, profile_channel_priority(&s.nodes.channels[systems_channel(&s, "1.1")]));
+    TEST_ASSERT_EQUAL_HEX16(0x2110, profile_channel_priority(&s.nodes.channels[systems_channel(&s, "1.2")]));
 }
 
 static void check_before(const char *first, const char *second)
 {
     const uint8_t a = systems_channel(&s, first);
     const uint8_t b = systems_channel(&s, second);
-    TEST_ASSERT_TRUE_MESSAGE(profile_is_before(&s.nodes, a, b), first);
-    TEST_ASSERT_FALSE_MESSAGE(profile_is_before(&s.nodes, b, a), second);
-    TEST_ASSERT_FALSE_MESSAGE(profile_is_before(&s.nodes, a, a), first);
+    TEST_ASSERT_TRUE_MESSAGE(profile_match_is_before(&s.nodes, a, b), first);
+    TEST_ASSERT_FALSE_MESSAGE(profile_match_is_before(&s.nodes, b, a), second);
+    TEST_ASSERT_FALSE_MESSAGE(profile_match_is_before(&s.nodes, a, a), first);
 }
 
 /* D-PRO-3: profile, then VID, PID, SN, index; each decides over all that come behind it. */
@@ -110,9 +111,9 @@ static void test_the_order_of_equally_alike_channels(void)
 
 static void check_precedes(const pdcp_identity_t *a, const pdcp_identity_t *b)
 {
-    TEST_ASSERT_TRUE(profile_precedes(0x2110, a, 1, 0x2110, b, 1));
-    TEST_ASSERT_FALSE(profile_precedes(0x2110, b, 1, 0x2110, a, 1));
-    TEST_ASSERT_TRUE(profile_precedes(0x2110, b, 1, 0x2120, a, 1));
+    TEST_ASSERT_TRUE(profile_match_precedes(0x2110, a, 1, 0x2110, b, 1));
+    TEST_ASSERT_FALSE(profile_match_precedes(0x2110, b, 1, 0x2110, a, 1));
+    TEST_ASSERT_TRUE(profile_match_precedes(0x2110, b, 1, 0x2120, a, 1));
 }
 
 static void test_the_order_of_identities(void)
@@ -122,7 +123,7 @@ static void test_the_order_of_identities(void)
     const pdcp_identity_t c = {.vid = 2, .pid = 1, .sn = 0xFFFF};
     check_precedes(&a, &b);
     check_precedes(&b, &c);
-    TEST_ASSERT_FALSE(profile_precedes(0x2110, &b, 1, 0x2110, &b, 1));
+    TEST_ASSERT_FALSE(profile_match_precedes(0x2110, &b, 1, 0x2110, &b, 1));
 }
 
 static void test_only_channels_of_devices_that_are_set_up_are_ready(void)
@@ -130,15 +131,15 @@ static void test_only_channels_of_devices_that_are_set_up_are_ready(void)
     systems_add(&s, "D1 in 1 5000 2110, out 2 5000 2110");
     const uint8_t in = systems_channel(&s, "1.1");
     const uint8_t out = systems_channel(&s, "1.2");
-    TEST_ASSERT_TRUE(profile_is_ready(&s.nodes, in, PDCP_INPUT));
-    TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, in, PDCP_OUTPUT));
-    TEST_ASSERT_TRUE(profile_is_ready(&s.nodes, out, PDCP_OUTPUT));
-    TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, PDCP_NONE, PDCP_INPUT));
-    TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, PDCP_CHANNELS_MAX - 1, PDCP_INPUT));
+    TEST_ASSERT_TRUE(profile_channel_is_ready(&s.nodes, in, PDCP_INPUT));
+    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, in, PDCP_OUTPUT));
+    TEST_ASSERT_TRUE(profile_channel_is_ready(&s.nodes, out, PDCP_OUTPUT));
+    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, PDCP_NONE, PDCP_INPUT));
+    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, PDCP_CHANNELS_MAX - 1, PDCP_INPUT));
     static const uint8_t states[] = {PDCP_NODE_SETUP, PDCP_NODE_FAILED, PDCP_NODE_LOST};
     for (unsigned i = 0; i < sizeof states; i++) {
         s.nodes.nodes[0].state = states[i];
-        TEST_ASSERT_FALSE(profile_is_ready(&s.nodes, in, PDCP_INPUT));
+        TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, in, PDCP_INPUT));
     }
 }
 

@@ -5,7 +5,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "profile_match.h"
+#include "profile_channel.h"
 #include "systems.h"
 #include "unity.h"
 
@@ -172,8 +172,9 @@ static void read_back(void)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         profile_link_t link;
-        if (profile_is_ready(&s.nodes, i, PDCP_INPUT) && profile_source_of(&s.nodes, i, &link.output)) {
-            profile_end_of(&s.nodes, i, &link.input);
+        if (profile_channel_is_ready(&s.nodes, i, PDCP_INPUT) &&
+            profile_channel_source(&s.nodes, i, &link.output)) {
+            profile_channel_end(&s.nodes, i, &link.input);
             TEST_ASSERT_TRUE(profile_links_put(&s.links, &link, false));
         }
         s.nodes.channels[i].link = PDCP_LINK_NONE;
@@ -841,13 +842,13 @@ static void test_a_second_sole_access_input_breaks_sole_access(void)
     systems_add(&s, "D1 out 1 5000 2110, out 2 5000 2110; D2 in 1 5200 2110, in 2 5200 2110, in 3 5000 2110");
     const uint8_t output = systems_channel(&s, "1.1");
     systems_link(&s, "1.1>2.1 1.2>2.3");
-    TEST_ASSERT_TRUE(profile_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.2")));
-    TEST_ASSERT_FALSE(profile_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.1")));
-    TEST_ASSERT_FALSE(profile_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.3")));
+    TEST_ASSERT_TRUE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.2")));
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.1")));
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.3")));
     TEST_ASSERT_FALSE(
-        profile_breaks_sole_access(&s.nodes, systems_channel(&s, "1.2"), systems_channel(&s, "2.2")));
+        profile_channel_breaks_sole_access(&s.nodes, systems_channel(&s, "1.2"), systems_channel(&s, "2.2")));
     s.nodes.channels[systems_channel(&s, "2.1")].link = PDCP_LINK_INACTIVE;
-    TEST_ASSERT_FALSE(profile_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.2")));
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.2")));
 }
 
 /* --- Growth --- */

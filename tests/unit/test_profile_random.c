@@ -5,7 +5,7 @@
 #include <stdlib.h>
 #include <string.h>
 
-#include "profile_match.h"
+#include "profile_channel.h"
 #include "systems.h"
 #include "unity.h"
 
@@ -676,10 +676,10 @@ static void link_by_host(void)
     const uint8_t input = any_channel();
     if (is_there(output, PDCP_OUTPUT) && is_there(input, PDCP_INPUT) &&
         s.nodes.channels[output].node != s.nodes.channels[input].node &&
-        !profile_breaks_sole_access(&s.nodes, output, input)) {
+        !profile_channel_breaks_sole_access(&s.nodes, output, input)) {
         systems_connect(&s, output, input);
-        profile_end_of(&s.nodes, output, &link.output);
-        profile_end_of(&s.nodes, input, &link.input);
+        profile_channel_end(&s.nodes, output, &link.output);
+        profile_channel_end(&s.nodes, input, &link.input);
         check(profile_links_put(&s.links, &link, true), "no room for the host's link");
     }
 }

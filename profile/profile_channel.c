@@ -1,0 +1,83 @@
+#include "profile_channel.h"
+
+#include "profile_type.h"
+
+bool profile_channel_is_sole(const pdcp_channel_t *channel)
+{
+    return (channel->type & PROFILE_TYPE_SOLE) != 0;
+}
+
+bool profile_channel_is_terminal(const pdcp_channel_t *channel)
+{
+    return (channel->type & PROFILE_TYPE_TERMINAL) != 0;
+}
+
+uint16_t profile_channel_priority(const pdcp_channel_t *channel)
+{
+    return channel->terminal_profile != 0 ? channel->terminal_profile : channel->profile;
+}
+
+bool profile_channel_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer)
+{
+    if (channel == PDCP_NONE) {
+        return false;
+    }
+    const pdcp_channel_t *entry = &nodes->channels[channel];
+    return entry->transfer == transfer && /* a free entry of the pool has none */
+           nodes->nodes[entry->node].state == PDCP_NODE_READY;
+}
+
+uint8_t profile_channel_feed(const pdcp_nodes_t *nodes, uint8_t input)
+{
+    const pdcp_channel_t *channel = &nodes->channels[input];
+    return channel->link == PDCP_LINK_ACTIVE && profile_channel_is_ready(nodes, input, PDCP_INPUT)
+               ? channel->feed
+               : PDCP_NONE;
+}
+
+bool profile_channel_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input)
+{
+    if (!profile_channel_is_sole(&nodes->channels[input])) {
+        return false;
+    }
+    const pdcp_channel_t *channel = nodes->channels;
+    for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
+        if (i != input && profile_channel_feed(nodes, i) == output && profile_channel_is_sole(channel)) {
+            return true;
+        }
+    }
+    return false;
+}
+
+void profile_channel_end(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end)
+{
+    const pdcp_channel_t *entry = &nodes->channels[channel];
+    const pdcp_node_t *node = &nodes->nodes[entry->node];
+    end->owner = node->identity;
+    end->owner_type = node->type;
+    end->owner_profile = node->profile;
+    end->type = entry->type;
+    end->profile = entry->profile;
+    end->index = entry->index;
+}
+
+bool profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end)
+{
+    const pdcp_channel_t *entry = &nodes->channels[input];
+    if (entry->source_index == PDCP_NO_SOURCE_INDEX || entry->source_index == 0) {
+        return false;
+    }
+    const uint8_t place = pdcp_nodes_find(nodes, &entry->source);
+    end->owner = entry->source;
+    end->owner_type = 0;
+    end->owner_profile = 0;
+    if (place != PDCP_NONE) {
+        const pdcp_node_t *owner = &nodes->nodes[place];
+        end->owner_type = owner->type;
+        end->owner_profile = owner->profile;
+    }
+    end->type = entry->source_type;
+    end->profile = entry->source_profile;
+    end->index = entry->source_index;
+    return true;
+}

@@ -1,0 +1,35 @@
+/* What the bus tables say of a channel, in the words of the profile layer. Nothing is changed here. */
+#ifndef PROFILE_CHANNEL_H
+#define PROFILE_CHANNEL_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_nodes.h"
+#include "profile_config.h"
+
+/* Flags of the type of an input. */
+bool profile_channel_is_sole(const pdcp_channel_t *channel);
+bool profile_channel_is_terminal(const pdcp_channel_t *channel);
+
+/* The profile that a terminal channel is served by, lowest first: its terminal profile, or its own if that is
+ * 0 (D-PRO-3). */
+uint16_t profile_channel_priority(const pdcp_channel_t *channel);
+
+/* Is this channel on a device that is set up, and does it have this direction (PDCP_INPUT, PDCP_OUTPUT)? The
+ * channel may be PDCP_NONE. */
+bool profile_channel_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
+
+/* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
+uint8_t profile_channel_feed(const pdcp_nodes_t *nodes, uint8_t input);
+
+/* Would the link give an output a second sole-access input? */
+bool profile_channel_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
+
+/* Describes a channel as the end of a link. */
+void profile_channel_end(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end);
+
+/* Describes the source that an input names, which need not be there. False: it names none. */
+bool profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end);
+
+#endif

@@ -35,7 +35,7 @@ bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host)
     const pdcp_nodes_t *nodes = run->scene.nodes;
     profile_link_t link;
     profile_channel_end(nodes, input, &link.input);
-    if (run->frozen || !profile_channel_source(nodes, input, &link.output) ||
+    if (run->frozen || !profile_channel_named_source(nodes, input, &link.output) ||
         (!by_host && profile_links_is_claimed(&run->links, &link))) {
         return true;
     }
@@ -50,7 +50,7 @@ bool profile_active_take_up(profile_run_t *run)
 {
     bool complete = true;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (profile_channel_feed(run->scene.nodes, i) != PDCP_NONE &&
+        if (profile_channel_source(run->scene.nodes, i) != PDCP_NONE &&
             profile_active_entry_of(run, i) == PDCP_NONE &&
             profile_active_stood_in_for(run, i) == PDCP_NONE && !profile_active_adopt(run, i, false)) {
             complete = false;
@@ -67,7 +67,8 @@ static uint8_t next_input_of(const pdcp_nodes_t *nodes, uint8_t node, uint8_t la
     profile_end_t source;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         if ((node == PDCP_NONE || nodes->channels[i].node == node) &&
-            profile_channel_is_ready(nodes, i, PDCP_INPUT) && profile_channel_source(nodes, i, &source) &&
+            profile_channel_is_ready(nodes, i, PDCP_INPUT) &&
+            profile_channel_named_source(nodes, i, &source) &&
             (last == PDCP_NONE || profile_match_is_before(nodes, last, i)) &&
             (best == PDCP_NONE || profile_match_is_before(nodes, i, best))) {
             best = i;
@@ -106,15 +107,15 @@ bool profile_active_load_link(profile_run_t *run, const profile_link_t *link)
 static uint8_t replaced_by(const profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
-    const uint8_t feed = profile_channel_feed(nodes, input);
-    if (feed == PDCP_NONE) {
+    const uint8_t source = profile_channel_source(nodes, input);
+    if (source == PDCP_NONE) {
         return PDCP_NONE;
     }
     uint8_t entry = profile_active_stood_in_for(run, input);
     if (entry == PDCP_NONE) {
         entry = profile_active_entry_of(run, input);
         if (entry != PDCP_NONE && profile_links_channel(&run->links, nodes, &run->links.entries[entry].output,
-                                                        PDCP_OUTPUT) == feed) {
+                                                        PDCP_OUTPUT) == source) {
             return PDCP_NONE;
         }
     }

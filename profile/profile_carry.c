@@ -9,13 +9,13 @@
 static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     profile_end_t source;
-    if (profile_channel_source(run->scene.nodes, input, &source)) {
+    if (profile_channel_named_source(run->scene.nodes, input, &source)) {
         pdcp_arb_forget_source(arb, now_ms, input);
     }
 }
 
-/* Takes the link of an input away: it rests if the configuration has it, and goes otherwise. The host sees a
- * link of the configuration whose source is missing as inactive (D-BUS-10, D-PRO-15). */
+/* Takes the link of an input away: it becomes inactive if the configuration has it, and goes otherwise. The
+ * host sees a link of the configuration whose source is missing as inactive (D-BUS-10, D-PRO-15). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
@@ -61,7 +61,7 @@ static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
 {
     const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
     uint8_t c = owner->needs_stride != 0 ? owner->first_channel : (uint8_t)PDCP_NONE;
-    while (c != PDCP_NONE && (profile_channel_feed(nodes, c) != PDCP_NONE ||
+    while (c != PDCP_NONE && (profile_channel_source(nodes, c) != PDCP_NONE ||
                               !pdcp_nodes_needs(nodes, channel, false, nodes->channels[c].index))) {
         c = nodes->channels[c].next;
     }
@@ -69,14 +69,14 @@ static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
 }
 
 /* Has the host made this link? Then it needs nothing (D-PRO-9). */
-static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
+static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t source)
 {
     const uint8_t entry = profile_active_entry_of(run, input);
     if (entry == PDCP_NONE) {
         return false;
     }
     const profile_entry_t *own = &run->links.entries[entry];
-    return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, feed);
+    return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, source);
 }
 
 /* Does this link work although something that it requires is not connected? Links that the plan under way has
@@ -84,17 +84,17 @@ static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t feed)
 static bool is_lacking(const profile_run_t *run, uint8_t input)
 {
     const pdcp_nodes_t *nodes = run->scene.nodes;
-    const uint8_t feed = profile_channel_feed(nodes, input);
-    return feed != PDCP_NONE && !pdcp_bit(run->scene.made, input) && !is_hosts(run, input, feed) &&
-           (misses_something(nodes, feed) || misses_something(nodes, input));
+    const uint8_t source = profile_channel_source(nodes, input);
+    return source != PDCP_NONE && !pdcp_bit(run->scene.made, input) && !is_hosts(run, input, source) &&
+           (misses_something(nodes, source) || misses_something(nodes, input));
 }
 
-/* Lets links rest that lack something, once the plan has met a link that fails (D-PRO-9). Most often the plan
- * connects what they lack at once. But a device that does not answer may take long, and meanwhile a hand
- * would obey a controller that hears nothing. True: a link rests now. */
-static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
+/* Makes links inactive that lack something, once the plan has met a link that fails (D-PRO-9). Most often the
+ * plan connects what they lack at once. But a device that does not answer may take long, and meanwhile a hand
+ * would obey a controller that hears nothing. True: a link was made inactive. */
+static bool deactivate_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
-    bool rested = false;
+    bool any = false;
     uint8_t i = 0;
     if (run->tries + run->scene.banned_count == 0 || run->what == PROFILE_PLAN_ENFORCE) {
         return false;
@@ -102,13 +102,13 @@ static bool rest_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now
     while (i < PDCP_CHANNELS_MAX) {
         if (is_lacking(run, i)) {
             pdcp_arb_rest(arb, now_ms, i);
-            rested = true;
+            any = true;
             i = 0; /* others may require this one */
         } else {
             i++;
         }
     }
-    return rested;
+    return any;
 }
 
 /* The next input whose link must still be made, terminal ones last; PDCP_NONE: all are made. Ends that have
@@ -152,7 +152,7 @@ bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     if (!pdcp_arb_links_settled(arb)) {
         return true;
     }
-    if (rest_lacking(run, arb, now_ms)) {
+    if (deactivate_lacking(run, arb, now_ms)) {
         return true;
     }
     const uint8_t input = next_input(run);
@@ -160,10 +160,10 @@ bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
         finish(run);
         return false;
     }
-    run->wish.input = input;
-    run->wish.output = run->plan.want[input];
-    run->wishing = pdcp_arb_connect(arb, run->wish.output, input) == PDCP_OK;
-    if (!run->wishing) { /* a device has changed its channels meanwhile */
+    run->request.input = input;
+    run->request.output = run->plan.want[input];
+    run->requesting = pdcp_arb_connect(arb, run->request.output, input) == PDCP_OK;
+    if (!run->requesting) { /* a device has changed its channels meanwhile */
         profile_run_stir(run, now_ms);
     }
     return true;

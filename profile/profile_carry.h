@@ -1,5 +1,5 @@
 /* Carries a plan out on the bus: removes links that it does not want, then makes those it wants one by one
- * (D-PRO-5). While links fail, those that require what is not connected rest (D-PRO-9). */
+ * (D-PRO-5). While links fail, those that require what is not connected become inactive (D-PRO-9). */
 #ifndef PROFILE_CARRY_H
 #define PROFILE_CARRY_H
 

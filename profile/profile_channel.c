@@ -27,7 +27,7 @@ bool profile_channel_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_
            nodes->nodes[entry->node].state == PDCP_NODE_READY;
 }
 
-uint8_t profile_channel_feed(const pdcp_nodes_t *nodes, uint8_t input)
+uint8_t profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input)
 {
     const pdcp_channel_t *channel = &nodes->channels[input];
     return channel->link == PDCP_LINK_ACTIVE && profile_channel_is_ready(nodes, input, PDCP_INPUT)
@@ -42,7 +42,7 @@ bool profile_channel_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t outpu
     }
     const pdcp_channel_t *channel = nodes->channels;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++, channel++) {
-        if (i != input && profile_channel_feed(nodes, i) == output && profile_channel_is_sole(channel)) {
+        if (i != input && profile_channel_source(nodes, i) == output && profile_channel_is_sole(channel)) {
             return true;
         }
     }
@@ -61,7 +61,7 @@ void profile_channel_end(const pdcp_nodes_t *nodes, uint8_t channel, profile_end
     end->index = entry->index;
 }
 
-bool profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end)
+bool profile_channel_named_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end)
 {
     const pdcp_channel_t *entry = &nodes->channels[input];
     if (entry->source_index == PDCP_NO_SOURCE_INDEX || entry->source_index == 0) {

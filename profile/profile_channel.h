@@ -20,8 +20,8 @@ uint16_t profile_channel_priority(const pdcp_channel_t *channel);
  * channel may be PDCP_NONE. */
 bool profile_channel_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
 
-/* The output that an active link feeds this input with, if the input is ready; PDCP_NONE: there is none. */
-uint8_t profile_channel_feed(const pdcp_nodes_t *nodes, uint8_t input);
+/* The source of an input that is ready and has an active link; PDCP_NONE: there is none. */
+uint8_t profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input);
 
 /* Would the link give an output a second sole-access input? */
 bool profile_channel_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
@@ -29,7 +29,7 @@ bool profile_channel_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t outpu
 /* Describes a channel as the end of a link. */
 void profile_channel_end(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end);
 
-/* Describes the source that an input names, which need not be there. False: it names none. */
-bool profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end);
+/* Describes the source that an input names, which need not be on the bus. False: it names none. */
+bool profile_channel_named_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end);
 
 #endif

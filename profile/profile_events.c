@@ -63,28 +63,28 @@ static void on_broken(profile_run_t *run, uint8_t input)
 
 /* A link that this layer has asked for was made or has failed. An answer may be missing on a bad line, or
  * when a device was away for a moment. That must not lead to another limb, so the link is tried again. */
-static void on_wish(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
+static void on_request_end(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
 {
-    run->wishing = false;
+    run->requesting = false;
     if (status == PDCP_OK) {
         run->tries = 0;
-        pdcp_set_bit(run->scene.made, run->wish.input, true);
+        pdcp_set_bit(run->scene.made, run->request.input, true);
         run->moves++;
         return;
     }
     if (run->what == PROFILE_PLAN_ENFORCE) { /* it was lost meanwhile; the action ends without it */
-        on_broken(run, run->wish.input);
+        on_broken(run, run->request.input);
         return;
     }
     run->tries++;
     if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
-        ban(run, now_ms, run->wish);
+        ban(run, now_ms, run->request);
     }
     profile_run_make_due(run, run->what);
 }
 
-/* A link that the host has asked for was made or has failed. What rested for lack of it comes back. */
-static void on_hosts_wish(profile_run_t *run, const pdcp_event_t *event)
+/* A link that the host has asked for was made or has failed. What was inactive for lack of it comes back. */
+static void on_hosts_request_end(profile_run_t *run, const pdcp_event_t *event)
 {
     if (event->status == PDCP_OK) {
         (void)profile_active_adopt(run, event->channel, true);
@@ -115,7 +115,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
 }
 
 /* The host has taken a link away. It leaves the configuration, so that no plan makes it again, and what
- * requires its input rests (D-PRO-25). */
+ * requires its input becomes inactive (D-PRO-25). */
 static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 {
     run->plan.want[input] = PDCP_NONE;
@@ -127,8 +127,8 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
 }
 
 /* The audit has let the link of an input go. The pair is left out like one that could not be linked
- * (D-PRO-14), and what requires the input rests (D-BUS-40). Nothing is put in its place: whoever disturbs a
- * link must not get another limb by it (D-PRO-26). */
+ * (D-PRO-14), and what requires the input becomes inactive (D-BUS-40). Nothing is put in its place: whoever
+ * disturbs a link must not get another limb by it (D-PRO-26). */
 static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 {
     const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
@@ -164,7 +164,7 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     } else if (is_broken(run, input)) {
         on_broken(run, input);
     } else if (link != PDCP_LINK_NONE && run->state != PROFILE_WAITING && !arb->bus.link.stored &&
-               !run->wishing) {
+               !run->requesting) {
         on_asked(run, input, entry);
     }
 }
@@ -184,10 +184,10 @@ void profile_events_take(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now
         on_reset(run, now_ms, event);
         break;
     case PDCP_EVENT_WISH:
-        if (run->wishing) {
-            on_wish(run, now_ms, (pdcp_status_t)event->status);
+        if (run->requesting) {
+            on_request_end(run, now_ms, (pdcp_status_t)event->status);
         } else {
-            on_hosts_wish(run, event);
+            on_hosts_request_end(run, event);
         }
         break;
     case PDCP_EVENT_LINK:

@@ -36,7 +36,7 @@ static uint32_t hash_working(const profile_scene_t *scene)
 {
     uint32_t hash = HASH_BEGIN;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        hash = hash_on(hash, profile_scene_feed(scene, i));
+        hash = hash_on(hash, profile_scene_source(scene, i));
     }
     return hash;
 }
@@ -45,7 +45,7 @@ static uint32_t hash_working(const profile_scene_t *scene)
 
 static profile_phase_t look(profile_board_t *board)
 {
-    profile_board_set_source(board, board->at, profile_scene_feed(board->scene, board->at));
+    profile_board_set_source(board, board->at, profile_scene_source(board->scene, board->at));
     profile_board_go_to_next(board, PDCP_CHANNELS_MAX);
     if (board->at != 0) {
         return PROFILE_PHASE_LOOK;

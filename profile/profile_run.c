@@ -36,8 +36,8 @@ void profile_run_stir(profile_run_t *run, uint32_t now_ms)
 static void leave_unwanted(profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const uint8_t feed = profile_channel_feed(run->scene.nodes, i);
-        if (feed != PDCP_NONE && feed != run->plan.want[i]) {
+        const uint8_t source = profile_channel_source(run->scene.nodes, i);
+        if (source != PDCP_NONE && source != run->plan.want[i]) {
             pdcp_set_bit(run->scene.made, i, true);
         }
     }

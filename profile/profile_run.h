@@ -49,8 +49,8 @@ typedef struct {
     uint8_t due;                             /* profile_plan_what_t of the plan to be made next, 0: none is */
     uint8_t making;                          /* profile_making_t */
     bool stale;                              /* what the plan being made is made from has changed */
-    bool wishing;        /* the arbitrator was asked to make a link and has not yet told the outcome */
-    profile_pair_t wish; /* that link */
+    bool requesting;                         /* a link request is under way */
+    profile_pair_t request;                  /* the link that it asks for */
     bool urgent;         /* the plan that is due does not wait for devices being set up; never without due */
     uint8_t at_start;    /* profile_plan_what_t allowed at the start-up, by the flags of 2404h */
     uint8_t at_events;   /* profile_plan_what_t allowed when devices come or go, by the flags of 2404h */

@@ -26,11 +26,11 @@ bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8
     return false;
 }
 
-uint8_t profile_scene_feed(const profile_scene_t *scene, uint8_t input)
+uint8_t profile_scene_source(const profile_scene_t *scene, uint8_t input)
 {
-    const uint8_t feed = profile_channel_feed(scene->nodes, input);
-    if (!profile_channel_is_ready(scene->nodes, feed, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
+    const uint8_t source = profile_channel_source(scene->nodes, input);
+    if (!profile_channel_is_ready(scene->nodes, source, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
         return PDCP_NONE;
     }
-    return feed;
+    return source;
 }

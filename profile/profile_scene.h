@@ -41,7 +41,7 @@ bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t 
 /* Must the plan leave this pair out? */
 bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8_t input);
 
-/* The output that feeds an input and counts as working; PDCP_NONE: none does. */
-uint8_t profile_scene_feed(const profile_scene_t *scene, uint8_t input);
+/* The source of an input whose link works and counts; PDCP_NONE: there is none. */
+uint8_t profile_scene_source(const profile_scene_t *scene, uint8_t input);
 
 #endif

@@ -15,7 +15,7 @@ void profile_start_wait(profile_run_t *run, uint32_t now_ms)
     run->state = PROFILE_WAITING;
     run->due = 0;
     run->making = PROFILE_NOT_MAKING;
-    run->wishing = false;
+    run->requesting = false;
     run->stirred_ms = now_ms;
 }
 

@@ -67,7 +67,7 @@ bool profile_step(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
         }
         profile_run_stir(run, now_ms);
     }
-    if (run->wishing) {
+    if (run->requesting) {
         return false;
     }
     if (run->due != 0 && !is_held_back(run, arb, now_ms)) {
@@ -87,7 +87,7 @@ uint32_t profile_step_next_ms(const profile_run_t *run, const pdcp_arb_t *arb, u
         const uint32_t start_ms = profile_start_ms(run, arb);
         return pdcp_time_before(now_ms, start_ms) ? start_ms : now_ms + PDCP_TIME_FAR_MS;
     }
-    if (run->making != PROFILE_NOT_MAKING && !run->wishing) {
+    if (run->making != PROFILE_NOT_MAKING && !run->requesting) {
         return now_ms;
     }
     const uint32_t next_ms = alarm_ms(run, now_ms);

@@ -251,17 +251,17 @@ static void test_the_source_that_an_input_names(void)
     systems_add(&s, "D1 2:3:4 out 1 5000 2110; D2 in 1 5000 2110, in 2 5000 2110, in 3 5000 2110");
     s.nodes.nodes[systems_place(&s, 1)].type = 0x0A0B;
     systems_link(&s, "1.1>2.1");
-    TEST_ASSERT_TRUE(profile_channel_source(&s.nodes, systems_channel(&s, "2.1"), &end));
+    TEST_ASSERT_TRUE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.1"), &end));
     const profile_end_t here = {{2, 3, 4}, 0x0A0B, 0, 0x5000, 0x2110, 1};
     check_end(&here, &end);
     systems_forget(&s, systems_place(&s, 1));
-    TEST_ASSERT_TRUE(profile_channel_source(&s.nodes, systems_channel(&s, "2.1"), &end));
+    TEST_ASSERT_TRUE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.1"), &end));
     const profile_end_t gone = {{2, 3, 4}, 0, 0, 0x5000, 0x2110, 1};
     check_end(&gone, &end);
     TEST_ASSERT_FALSE(
-        profile_channel_source(&s.nodes, systems_channel(&s, "2.2"), &end)); /* index FFh (D-BUS-7) */
+        profile_channel_named_source(&s.nodes, systems_channel(&s, "2.2"), &end)); /* index FFh (D-BUS-7) */
     s.nodes.channels[systems_channel(&s, "2.3")].source_index = 0;
-    TEST_ASSERT_FALSE(profile_channel_source(&s.nodes, systems_channel(&s, "2.3"), &end));
+    TEST_ASSERT_FALSE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.3"), &end));
 }
 
 int main(void)

@@ -173,7 +173,7 @@ static void read_back(void)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         profile_link_t link;
         if (profile_channel_is_ready(&s.nodes, i, PDCP_INPUT) &&
-            profile_channel_source(&s.nodes, i, &link.output)) {
+            profile_channel_named_source(&s.nodes, i, &link.output)) {
             profile_channel_end(&s.nodes, i, &link.input);
             TEST_ASSERT_TRUE(profile_links_put(&s.links, &link, false));
         }

@@ -49,7 +49,7 @@ static void make_slices(int count)
     for (int i = 0; i < count; i++) {
         (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
         TEST_ASSERT_EQUAL(PROFILE_MAKING, app.limb.run.making);
-        TEST_ASSERT_FALSE(app.limb.run.wishing);
+        TEST_ASSERT_FALSE(app.limb.run.requesting);
         TEST_ASSERT_EQUAL_UINT32(x.now_ms, profile_step_next_ms(&app.limb.run, &app.arb, x.now_ms));
     }
 }
@@ -63,7 +63,7 @@ static int finish_plan(void)
         (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
     } while (app.limb.run.making == PROFILE_MAKING);
     TEST_ASSERT_EQUAL(PROFILE_JUST_MADE, app.limb.run.making);
-    TEST_ASSERT_FALSE(app.limb.run.wishing);
+    TEST_ASSERT_FALSE(app.limb.run.requesting);
     return slices;
 }
 
@@ -92,7 +92,7 @@ static void test_a_plan_that_nothing_disturbs(void)
     TEST_ASSERT_GREATER_THAN(10, finish_plan());
     expect_plan_of_the_tables();
     (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
-    TEST_ASSERT_TRUE(app.limb.run.wishing); /* and then it is carried out */
+    TEST_ASSERT_TRUE(app.limb.run.requesting); /* and then it is carried out */
 }
 
 /* A device goes when half of the plan is made: nothing of it is wanted any more, nobody is linked to it. */

@@ -1,5 +1,5 @@
-/* pdcp-node: simulated devices on a real or simulated bus. All devices of one process share one controller.
- */
+/* pdcp-node: simulated devices on a real or simulated bus. All devices of one process share one
+ * controller. */
 #include <argp.h>
 #include <errno.h>
 #include <inttypes.h>

@@ -1,6 +1,5 @@
-/* pdcpd: the arbitrator as a Linux daemon. Joins the application to a CAN bus, a host and a file; with --can
- * sim the bus and, with
- * --node, the devices are in this process too. */
+/* pdcpd: the arbitrator as a Linux daemon. Joins the application to a CAN bus, a host and a file; with
+ * --can sim the bus is in this process too, and with --node its devices are. */
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdarg.h>

@@ -1,5 +1,5 @@
-/* A listening TCP socket on 127.0.0.1. Does not block; the owner watches fd and accepts when it is readable.
- */
+/* A listening TCP socket on 127.0.0.1. It does not block: the owner watches fd and accepts when it is
+ * readable. */
 #ifndef TCP_LISTENER_H
 #define TCP_LISTENER_H
 

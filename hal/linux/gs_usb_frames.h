@@ -1,8 +1,8 @@
 /* Frames to and from an adapter that speaks gs_usb: bulk transfers, and the tags by which it echoes a frame
  * that went to the bus. Private to hal/linux.
  *
- * The owner embeds gs_usb_frames_t, zeroed, and sets adapter. Transfers exist while an adapter is plugged in.
- */
+ * The owner embeds gs_usb_frames_t, zeroed, and sets adapter. Transfers exist while an adapter is plugged
+ * in. */
 #ifndef GS_USB_FRAMES_H
 #define GS_USB_FRAMES_H
 
@@ -12,7 +12,7 @@
 
 #define GS_USB_FRAMES_RECEIVES 24 /* transfers that wait for a frame */
 #define GS_USB_FRAMES_SENDS                                                                                  \
-    10 /* frames on the way to the bus: adapters have room for few, shared with reception */
+    10 /* frames on the way to the bus: adapters have few places, shared with reception */
 #define GS_USB_FRAMES_RING 1024
 #define GS_USB_FRAMES_PACKET_MAX 1024
 

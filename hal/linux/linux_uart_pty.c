@@ -118,8 +118,8 @@ static const char *pty_path(const hal_uart_t *uart)
     return ((const pty_t *)uart)->path;
 }
 
-/* A link to a terminal that exists is somebody's: a second program must not take a running one's host away.
- */
+/* A link to a terminal that exists is somebody's: a second program must not take a running one's host
+ * away. */
 static bool is_stale_link(const char *path)
 {
     struct stat status;

@@ -3,9 +3,9 @@
  * Everything on the wire is an element, "< word word ... >". In raw mode these carry frames:
  *
  *   < send ID DLC BYTE... >    client to server; a byte has one or two digits
- *   < frame ID TIME DATA >     server to client; TIME is SECONDS.MICROSECONDS, each byte of DATA has two
- * digits < error ID TIME >          server to client; the bus controller reports an error < error TEXT >
- * server to client; the server refuses an element
+ *   < frame ID TIME DATA >     server to client; TIME is SECONDS.MICROSECONDS, a byte of DATA has two digits
+ *   < error ID TIME >          server to client; the bus controller reports an error
+ *   < error TEXT >             server to client; the server refuses an element
  *
  * ID, BYTE and DATA are hexadecimal. An ID of up to three digits is a base one, a longer one is extended; the
  * identifier of an extended frame is not kept, as everywhere in this project. */

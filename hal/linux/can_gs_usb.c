@@ -260,11 +260,11 @@ static hal_can_t *can_gs_usb_open(const linux_can_request_t *wanted)
 {
     can_gs_usb_t *can = calloc(1, sizeof *can);
     if (can == NULL) {
-        linux_can_refuse(wanted, strerror(errno));
+        linux_can_backend_refuse(wanted, strerror(errno));
         return NULL;
     }
     const char *reason = "expected gs_usb, gs_usb:SERIAL, gs_usb/CHANNEL or gs_usb:SERIAL/CHANNEL";
-    linux_can_init(&can->adapter.base, &can_gs_usb_backend, wanted);
+    linux_can_backend_init(&can->adapter.base, &can_gs_usb_backend, wanted);
     can->frames.adapter = &can->adapter;
     can->requests.adapter = &can->adapter;
     can->requests.frames = &can->frames;
@@ -276,7 +276,7 @@ static hal_can_t *can_gs_usb_open(const linux_can_request_t *wanted)
         reason = start_now(can);
     }
     if (reason != NULL) {
-        linux_can_refuse(wanted, reason);
+        linux_can_backend_refuse(wanted, reason);
         can_gs_usb_close(&can->adapter.base);
         return NULL;
     }

@@ -460,10 +460,10 @@ static hal_can_t *can_socketcand_open(const linux_can_request_t *request)
 {
     can_socketcand_t *can = calloc(1, sizeof *can);
     if (can == NULL) {
-        linux_can_refuse(request, strerror(errno));
+        linux_can_backend_refuse(request, strerror(errno));
         return NULL;
     }
-    linux_can_init(&can->base, &can_socketcand_backend, request);
+    linux_can_backend_init(&can->base, &can_socketcand_backend, request);
     can->fd = -1;
     can->timer = -1;
     can->backoff_us = BACKOFF_MIN_US;
@@ -471,7 +471,7 @@ static hal_can_t *can_socketcand_open(const linux_can_request_t *request)
     can->splitter.restarts = true;
     const char *reason = start(can, request->address);
     if (reason != NULL) {
-        linux_can_refuse(request, reason);
+        linux_can_backend_refuse(request, reason);
         can_socketcand_close(&can->base);
         return NULL;
     }

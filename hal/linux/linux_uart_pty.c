@@ -199,13 +199,13 @@ static hal_uart_t *pty_open(const linux_uart_request_t *request)
 {
     pty_t *pty = calloc(1, sizeof *pty);
     if (pty == NULL) {
-        linux_uart_refuse(request, strerror(errno));
+        linux_uart_backend_refuse(request, strerror(errno));
         return NULL;
     }
-    linux_uart_init(&pty->uart, &linux_uart_pty_backend, request);
+    linux_uart_backend_init(&pty->uart, &linux_uart_pty_backend, request);
     pty->fd = -1;
     if (!open_all(pty, request->address)) {
-        linux_uart_refuse(request, reason_of(request->address));
+        linux_uart_backend_refuse(request, reason_of(request->address));
         pty_close(&pty->uart);
         return NULL;
     }

@@ -24,7 +24,8 @@ typedef struct {
     size_t error_size;
 } linux_uart_request_t;
 
-/* The functions are those of hal_uart.h and linux_uart.h. open returns NULL after linux_uart_backend_refuse. */
+/* The functions are those of hal_uart.h and linux_uart.h. open returns NULL after
+ * linux_uart_backend_refuse. */
 typedef struct {
     const char *kind;
     bool needs_address;

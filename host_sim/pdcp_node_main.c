@@ -1,5 +1,5 @@
-/* pdcp-node: simulated devices on a real or simulated bus. All devices of one process share one controller.
- */
+/* pdcp-node: simulated devices on a real or simulated bus. All devices of one process share one
+ * controller. */
 #include <argp.h>
 #include <errno.h>
 #include <inttypes.h>
@@ -68,6 +68,23 @@ static bool parse_seed(const char *text, uint32_t *seed)
     return true;
 }
 
+static void add_file(options_t *options, char *path)
+{
+    if (options->file_count == NODES_MAX) {
+        argp_failure(NULL, EXIT_BAD_START, 0, "more than %d devices", NODES_MAX);
+        return;
+    }
+    options->files[options->file_count++] = path;
+}
+
+static void check_options(const options_t *options)
+{
+    if (options->bus == NULL || options->file_count == 0) {
+        argp_failure(NULL, EXIT_BAD_START, 0, "%s is missing; --help tells more",
+                     options->bus == NULL ? "--can BUS" : "FILE");
+    }
+}
+
 static error_t on_option(int key, char *text, struct argp_state *state)
 {
     options_t *options = state->input;
@@ -91,17 +108,10 @@ static error_t on_option(int key, char *text, struct argp_state *state)
         (void)printf("pdcp-node %d.%d.%d\n", ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH);
         exit(EXIT_SUCCESS);
     case ARGP_KEY_ARG:
-        if (options->file_count == NODES_MAX) {
-            argp_failure(NULL, EXIT_BAD_START, 0, "more than %d devices", NODES_MAX);
-            return 0;
-        }
-        options->files[options->file_count++] = text;
+        add_file(options, text);
         return 0;
     case ARGP_KEY_END:
-        if (options->bus == NULL || options->file_count == 0) {
-            argp_failure(NULL, EXIT_BAD_START, 0, "%s is missing; --help tells more",
-                         options->bus == NULL ? "--can BUS" : "FILE");
-        }
+        check_options(options);
         return 0;
     default:
         return ARGP_ERR_UNKNOWN;

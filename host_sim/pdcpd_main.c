@@ -1,6 +1,5 @@
-/* pdcpd: the arbitrator as a Linux daemon. Joins the application to a CAN bus, a host and a file; with --can
- * sim the bus and, with
- * --node, the devices are in this process too. */
+/* pdcpd: the arbitrator as a Linux daemon. Joins the application to a CAN bus, a host and a file; with
+ * --can sim the bus is in this process too, and with --node its devices are. */
 #include <ctype.h>
 #include <inttypes.h>
 #include <stdarg.h>
@@ -91,46 +90,45 @@ static void say_audit(const daemon_t *daemon, const pdcp_event_t *event)
         channel->index, (unsigned)event->status);
 }
 
-static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
+/* What is said of an event that needs no more than its device. */
+static const struct {
+    pdcpd_log_t level;
+    bool names_device; /* the text follows the device's name */
+    const char *text;  /* NULL: nothing is said */
+} sayings[] = {
+    [PDCP_EVENT_BOUND] = {PDCPD_LOG_INFO, true, " is there"},
+    [PDCP_EVENT_READY] = {PDCPD_LOG_INFO, true, " is set up"},
+    [PDCP_EVENT_SETUP_FAILED] = {PDCPD_LOG_WARNING, true, " could not be set up: bound but unlinked"},
+    [PDCP_EVENT_LOST] = {PDCPD_LOG_WARNING, true, " is gone"},
+    [PDCP_EVENT_REFUSED] = {PDCPD_LOG_WARNING, false, "a device was refused: no node id or no place is left"},
+    [PDCP_EVENT_DUPLICATE] = {PDCPD_LOG_WARNING, true, " exists twice: the second device was refused"},
+    [PDCP_EVENT_FOREIGN] = {PDCPD_LOG_WARNING, false,
+                            "another arbitrator is on the bus; this one was there first and stays"},
+    [PDCP_EVENT_SILENT] = {PDCPD_LOG_WARNING, false,
+                           "another arbitrator was there first: on standby, silent"},
+    [PDCP_EVENT_STARTED] = {PDCPD_LOG_WARNING, false, "the other arbitrator is gone: takes over"},
+};
+
+static void say_device(const daemon_t *daemon, const pdcp_event_t *event)
 {
-    const daemon_t *daemon = ctx;
-    const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
+    const size_t kind = (size_t)event->kind;
     char name[40] = "a device";
-    (void)now_ms;
+    if (kind >= sizeof sayings / sizeof sayings[0] || sayings[kind].text == NULL) {
+        return;
+    }
     if (event->node != PDCP_NONE) {
-        const pdcp_node_t *node = &nodes->nodes[event->node];
+        const pdcp_node_t *node = &daemon->app.arb.bus.nodes.nodes[event->node];
         (void)snprintf(name, sizeof name, "%u:%u:%u (id %u)", node->identity.vid, node->identity.pid,
                        node->identity.sn, node->node_id);
     }
+    say(daemon, sayings[kind].level, "%s%s", sayings[kind].names_device ? name : "", sayings[kind].text);
+}
+
+static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
+{
+    const daemon_t *daemon = ctx;
+    (void)now_ms;
     switch (event->kind) {
-    case PDCP_EVENT_BOUND:
-        say(daemon, PDCPD_LOG_INFO, "%s is there", name);
-        break;
-    case PDCP_EVENT_READY:
-        say(daemon, PDCPD_LOG_INFO, "%s is set up", name);
-        break;
-    case PDCP_EVENT_SETUP_FAILED:
-        say(daemon, PDCPD_LOG_WARNING, "%s could not be set up: bound but unlinked", name);
-        break;
-    case PDCP_EVENT_LOST:
-        say(daemon, PDCPD_LOG_WARNING, "%s is gone", name);
-        break;
-    case PDCP_EVENT_REFUSED:
-        say(daemon, PDCPD_LOG_WARNING, "a device was refused: no node id or no place is left");
-        break;
-    case PDCP_EVENT_DUPLICATE:
-        say(daemon, PDCPD_LOG_WARNING, "%s exists twice: the second device was refused", name);
-        break;
-    case PDCP_EVENT_FOREIGN:
-        say(daemon, PDCPD_LOG_WARNING,
-            "another arbitrator is on the bus; this one was there first and stays");
-        break;
-    case PDCP_EVENT_SILENT:
-        say(daemon, PDCPD_LOG_WARNING, "another arbitrator was there first: on standby, silent");
-        break;
-    case PDCP_EVENT_STARTED:
-        say(daemon, PDCPD_LOG_WARNING, "the other arbitrator is gone: takes over");
-        break;
     case PDCP_EVENT_STATE:
         say(daemon, PDCPD_LOG_WARNING, "bus state: %s", bus_state_name(event->status));
         break;
@@ -141,6 +139,7 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
         say_audit(daemon, event);
         break;
     default:
+        say_device(daemon, event);
         break;
     }
 }

@@ -58,35 +58,57 @@ static bool add_node(pdcpd_options_t *options, const char *file)
     return true;
 }
 
+/* Where the text of an option is kept. NULL: it is not kept as a text. */
+static char **text_of(pdcpd_options_t *options, int key)
+{
+    switch (key) {
+    case 'c':
+        return &options->can;
+    case 'H':
+        return &options->host;
+    case 'n':
+        return &options->nvm;
+    case KEY_CONFIG:
+        return &options->config;
+    default:
+        return NULL;
+    }
+}
+
+/* What an option without an argument sets. NULL: it sets nothing. */
+static bool *flag_of(pdcpd_options_t *options, int key)
+{
+    switch (key) {
+    case KEY_NO_AUTOCONFIG:
+        return &options->no_autoconfig;
+    case KEY_STRICT_CRC:
+        return &options->strict_crc;
+    default:
+        return NULL;
+    }
+}
+
 static error_t on_option(int key, char *text, struct argp_state *state)
 {
     pdcpd_options_t *options = state->input;
+    char **kept = text_of(options, key);
+    bool *flag = flag_of(options, key);
+    if (kept != NULL) {
+        replace(kept, text);
+        return 0;
+    }
+    if (flag != NULL) {
+        *flag = true;
+        return 0;
+    }
     switch (key) {
     case ARGP_KEY_INIT:
         state->err_stream = NULL; /* one line, getopt's, and no hint behind it */
-        return 0;
-    case 'c':
-        replace(&options->can, text);
-        return 0;
-    case 'H':
-        replace(&options->host, text);
-        return 0;
-    case 'n':
-        replace(&options->nvm, text);
-        return 0;
-    case KEY_CONFIG:
-        replace(&options->config, text);
         return 0;
     case 'd':
         if (!add_node(options, text)) {
             argp_failure(NULL, PDCPD_EXIT_USAGE, 0, "--node: more than %d devices", PDCPD_NODES_MAX);
         }
-        return 0;
-    case KEY_NO_AUTOCONFIG:
-        options->no_autoconfig = true;
-        return 0;
-    case KEY_STRICT_CRC:
-        options->strict_crc = true;
         return 0;
     case KEY_LIST:
         pdcpd_list(stdout);

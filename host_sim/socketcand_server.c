@@ -1,9 +1,6 @@
 #include "socketcand_server.h"
 
-#include <arpa/inet.h>
 #include <errno.h>
-#include <fcntl.h>
-#include <inttypes.h>
 #include <netinet/in.h>
 #include <netinet/tcp.h>
 #include <stdio.h>
@@ -14,14 +11,12 @@
 #include <unistd.h>
 
 #include "oneshot.h"
+#include "socketcand_text.h"
+#include "tcp_listener.h"
 
 #define INPUT_MAX 4096
 #define ANSWERS_MAX 1024 /* output room beyond SOCKETCAND_OUTPUT_MAX that frames leave to answers */
 #define WORDS_MAX 12     /* of one element: a send of eight bytes has eleven */
-#define LISTEN_BACKLOG 128
-
-#define EXTENDED_ID_MAX 0x1FFFFFFFu
-#define BASE_ID_DIGITS 3u
 
 typedef enum {
     STAGE_CONNECTED, /* < hi > is sent, open is awaited */
@@ -37,10 +32,10 @@ typedef struct {
     stage_t stage;
     bool blocked;           /* the socket took no more: EPOLLOUT is awaited */
     bool broken;            /* nothing can be written any more and the loop does not watch it */
-    bool stalled;           /* the first element of in[] waits for room in the port's queue */
-    bool skipping;          /* up to the next ">": an element was too long */
-    bool noise;             /* text between elements has been reported */
+    bool stalled;           /* the splitter's element waits for room in the port's queue */
     uint64_t held_until_us; /* frames are not written before; 0: not held */
+    socketcand_text_splitter_t splitter;
+    size_t in_at; /* in[] is worked through up to here; to its end unless stalled */
     size_t in_used;
     size_t out_used;
     char in[INPUT_MAX];
@@ -52,141 +47,13 @@ struct socketcand_server {
     sim_bus_t *bus;
     socketcand_changed_t changed;
     void *ctx;
-    int listen_fd;
-    int spare_fd; /* given up for a moment to refuse a client when descriptors have run out */
-    int timer;    /* end of the next hold */
-    bool due;     /* socketcand_server_poll has something to do */
-    bool news;    /* frames were put on the bus, or a connection has come or gone */
+    tcp_listener_t listener;
+    int timer; /* end of the next hold */
+    bool due;  /* socketcand_server_poll has something to do */
+    bool news; /* frames were put on the bus, or a connection has come or gone */
     socketcand_stats_t stats;
     connection_t *connections[SIM_BUS_PORTS_MAX];
 };
-
-typedef struct {
-    const char *text;
-    size_t length;
-} word_t;
-
-/* ---- Text of the protocol ---- */
-
-static bool is_space(char c)
-{
-    return c == ' ' || c == '\t' || c == '\r' || c == '\n';
-}
-
-/* Splits at white space. Stops at WORDS_MAX words, which no element may have. */
-static size_t split(const char *text, size_t length, word_t words[WORDS_MAX])
-{
-    size_t count = 0;
-    size_t i = 0;
-
-    while (count < WORDS_MAX) {
-        while (i < length && is_space(text[i])) {
-            i++;
-        }
-        if (i == length) {
-            break;
-        }
-        words[count].text = &text[i];
-        while (i < length && !is_space(text[i])) {
-            i++;
-        }
-        words[count].length = (size_t)(&text[i] - words[count].text);
-        count++;
-    }
-    return count;
-}
-
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9') {
-        return c - '0';
-    }
-    if (c >= 'A' && c <= 'F') {
-        return c - 'A' + 10;
-    }
-    if (c >= 'a' && c <= 'f') {
-        return c - 'a' + 10;
-    }
-    return -1;
-}
-
-/* False: not one to digits_max (at most 8) hexadecimal digits. */
-static bool parse_hex(word_t word, size_t digits_max, uint32_t *value)
-{
-    *value = 0;
-    if (word.length > digits_max) {
-        return false;
-    }
-    for (size_t i = 0; i < word.length; i++) {
-        int digit = hex_digit(word.text[i]);
-
-        if (digit < 0) {
-            return false;
-        }
-        *value = *value << 4 | (uint32_t)digit;
-    }
-    return word.length > 0;
-}
-
-/* Returns what is wrong with the identifier, or NULL. */
-static const char *parse_id(word_t word, can_frame_t *frame)
-{
-    uint32_t id;
-
-    if (!parse_hex(word, 8, &id)) {
-        return "identifier is not one to eight hexadecimal digits";
-    }
-    if (word.length > BASE_ID_DIGITS) {
-        frame->kind = CAN_FRAME_EXTENDED;
-        return id > EXTENDED_ID_MAX ? "identifier over 1FFFFFFF" : NULL;
-    }
-    if (id > CAN_FRAME_ID_MAX) {
-        return "identifier over 7FF with three digits";
-    }
-    frame->kind = CAN_FRAME_BASE;
-    frame->id = (uint16_t)id;
-    return NULL;
-}
-
-/* Words of < send ID DLC BYTE... >. Returns what is wrong with them, or NULL. */
-static const char *parse_frame(const word_t *words, size_t count, can_frame_t *frame)
-{
-    uint32_t value;
-    const char *wrong;
-
-    memset(frame, 0, sizeof *frame);
-    wrong = parse_id(words[1], frame);
-    if (wrong != NULL) {
-        return wrong;
-    }
-    if (!parse_hex(words[2], 1, &value) || value > CAN_FRAME_DATA_MAX) {
-        return "DLC is not 0 to 8";
-    }
-    frame->dlc = (uint8_t)value;
-    if (count - 3 != frame->dlc) {
-        return "DLC and number of data bytes differ";
-    }
-    for (size_t i = 0; i < frame->dlc; i++) {
-        if (!parse_hex(words[3 + i], 2, &value)) {
-            return "data byte is not one or two hexadecimal digits";
-        }
-        frame->data[i] = (uint8_t)value;
-    }
-    return NULL;
-}
-
-/* < frame ... >; returns its length. Without data two spaces remain: python-can counts on both. */
-static size_t format_frame(char *line, size_t size, uint64_t time_us, const can_frame_t *frame)
-{
-    char data[2 * CAN_FRAME_DATA_MAX + 1] = "";
-    int id_digits = frame->kind == CAN_FRAME_EXTENDED ? 8 : (int)BASE_ID_DIGITS;
-
-    for (size_t i = 0; i < frame->dlc && i < CAN_FRAME_DATA_MAX; i++) {
-        snprintf(&data[2 * i], 3, "%02X", frame->data[i]);
-    }
-    return (size_t)snprintf(line, size, "< frame %0*X %" PRIu64 ".%06u %s >", id_digits, frame->id,
-                            time_us / 1000000u, (unsigned)(time_us % 1000000u), data);
-}
 
 /* ---- Output ---- */
 
@@ -256,7 +123,7 @@ static void flush(connection_t *connection)
 static void on_frame(void *ctx, uint64_t time_us, const can_frame_t *frame)
 {
     connection_t *connection = ctx;
-    char line[64];
+    char line[SOCKETCAND_TEXT_FRAME_BYTES];
 
     if (connection->stage != STAGE_RAW || connection->fd < 0) {
         return;
@@ -265,7 +132,8 @@ static void on_frame(void *ctx, uint64_t time_us, const can_frame_t *frame)
         connection->server->stats.frames_unsupported++;
         return;
     }
-    put(connection, line, format_frame(line, sizeof line, time_us, frame), SOCKETCAND_OUTPUT_MAX);
+    put(connection, line, socketcand_text_format_frame(line, sizeof line, time_us, frame),
+        SOCKETCAND_OUTPUT_MAX);
     connection->server->due = true;
 }
 
@@ -290,7 +158,7 @@ static void arm_hold_timer(socketcand_server_t *server)
 
 /* The handlers of elements return false when the element must wait for room in the port's queue. */
 
-static bool do_open(connection_t *connection, const word_t *words, size_t count)
+static bool do_open(connection_t *connection, const socketcand_text_t *words, size_t count)
 {
     (void)words;
     (void)count;
@@ -303,7 +171,7 @@ static bool do_open(connection_t *connection, const word_t *words, size_t count)
     return true;
 }
 
-static bool do_rawmode(connection_t *connection, const word_t *words, size_t count)
+static bool do_rawmode(connection_t *connection, const socketcand_text_t *words, size_t count)
 {
     socketcand_server_t *server = connection->server;
 
@@ -323,7 +191,7 @@ static bool do_rawmode(connection_t *connection, const word_t *words, size_t cou
     return true;
 }
 
-static bool do_send(connection_t *connection, const word_t *words, size_t count)
+static bool do_send(connection_t *connection, const socketcand_text_t *words, size_t count)
 {
     can_frame_t frame;
     const char *wrong;
@@ -332,7 +200,7 @@ static bool do_send(connection_t *connection, const word_t *words, size_t count)
         refuse(connection, "send before rawmode");
         return true;
     }
-    wrong = parse_frame(words, count, &frame);
+    wrong = socketcand_text_parse_send(words + 1, count - 1, &frame);
     if (wrong != NULL) {
         refuse(connection, wrong);
         return true;
@@ -344,7 +212,7 @@ static bool do_send(connection_t *connection, const word_t *words, size_t count)
     return true;
 }
 
-static bool do_echo(connection_t *connection, const word_t *words, size_t count)
+static bool do_echo(connection_t *connection, const socketcand_text_t *words, size_t count)
 {
     (void)words;
     (void)count;
@@ -356,7 +224,7 @@ static const struct {
     const char *name;
     size_t words_min; /* the name included */
     size_t words_max;
-    bool (*run)(connection_t *connection, const word_t *words, size_t count);
+    bool (*run)(connection_t *connection, const socketcand_text_t *words, size_t count);
 } commands[] = {
     {"send", 3, 3 + CAN_FRAME_DATA_MAX, do_send},
     {"echo", 1, 1, do_echo},
@@ -364,16 +232,15 @@ static const struct {
     {"rawmode", 1, 1, do_rawmode},
 };
 
-/* text: what stands between "<" and ">". */
-static bool run_element(connection_t *connection, const char *text, size_t length)
+/* Carries out the element that the splitter holds. */
+static bool run_element(connection_t *connection)
 {
-    word_t words[WORDS_MAX];
-    size_t count = split(text, length, words);
+    socketcand_text_t words[WORDS_MAX];
+    size_t count = socketcand_text_split(socketcand_text_element(&connection->splitter), words, WORDS_MAX);
 
     connection->held_until_us = 0; /* the client has read the answer to rawmode, or does not wait for it */
     for (size_t i = 0; count > 0 && i < sizeof commands / sizeof commands[0]; i++) {
-        if (strlen(commands[i].name) != words[0].length ||
-            memcmp(commands[i].name, words[0].text, words[0].length) != 0) {
+        if (!socketcand_text_is(words[0], commands[i].name)) {
             continue;
         }
         if (count < commands[i].words_min || count > commands[i].words_max) {
@@ -389,54 +256,30 @@ static bool run_element(connection_t *connection, const char *text, size_t lengt
     return true;
 }
 
-/* Returns the place of the next "<", or in_used. Text before it is reported once. */
-static size_t find_element(connection_t *connection, size_t from)
+/* Takes one character of the input. False: the element that it completes must wait. */
+static bool take_character(connection_t *connection, char c)
 {
-    size_t at = from;
-
-    while (at < connection->in_used && connection->skipping) {
-        connection->skipping = connection->in[at++] != '>';
+    switch (socketcand_text_take(&connection->splitter, c)) {
+    case SOCKETCAND_TEXT_STRAY:
+        refuse(connection, "text between elements");
+        return true;
+    case SOCKETCAND_TEXT_TOO_LONG:
+        refuse(connection, "element too long");
+        return true;
+    case SOCKETCAND_TEXT_ELEMENT:
+        return connection->splitter.cut || run_element(connection);
+    default:
+        return true;
     }
-    while (at < connection->in_used && connection->in[at] != '<') {
-        if (!is_space(connection->in[at]) && !connection->noise) {
-            connection->noise = true;
-            refuse(connection, "text between elements");
-        }
-        at++;
-    }
-    if (at < connection->in_used) {
-        connection->noise = false;
-    }
-    return at;
 }
 
-/* Works through the complete elements of the input; stops and sets stalled when one must wait. */
+/* Works through the input, first the element that waits; stops and sets stalled when one must wait. */
 static void consume(connection_t *connection)
 {
-    size_t at = 0;
-
-    connection->stalled = false;
-    for (;;) {
-        at = find_element(connection, at);
-
-        const char *start = &connection->in[at];
-        size_t left = connection->in_used - at;
-        const char *end = memchr(start, '>', left);
-        size_t length = end != NULL ? (size_t)(end - start) + 1 : left;
-
-        if (length > SOCKETCAND_ELEMENT_MAX) {
-            refuse(connection, "element too long");
-            connection->skipping = end == NULL;
-        } else if (end == NULL) {
-            break;
-        } else if (!run_element(connection, start + 1, length - 2)) {
-            connection->stalled = true;
-            break;
-        }
-        at += length;
+    connection->stalled = connection->stalled && !run_element(connection);
+    while (!connection->stalled && connection->in_at < connection->in_used) {
+        connection->stalled = !take_character(connection, connection->in[connection->in_at++]);
     }
-    connection->in_used -= at;
-    memmove(connection->in, &connection->in[at], connection->in_used);
 }
 
 /* ---- Life of a connection ---- */
@@ -459,7 +302,7 @@ static void hang_up(connection_t *connection)
     socketcand_server_t *server = connection->server;
 
     set_broken(connection);
-    if (connection->in_used > 0) {
+    if (connection->splitter.inside && !connection->splitter.cut) {
         server->stats.bad_elements++; /* one without end */
     }
     close(connection->fd);
@@ -478,14 +321,14 @@ static void acknowledge_at_once(int fd)
     setsockopt(fd, IPPROTO_TCP, TCP_QUICKACK, &on, sizeof on);
 }
 
-/* Reads once and works through what came. The connection is not stalled: in[] has room. */
+/* Reads once and works through what came. The connection is not stalled: in[] is worked through. */
 static void take_input(connection_t *connection)
 {
-    ssize_t n = recv(connection->fd, &connection->in[connection->in_used],
-                     sizeof connection->in - connection->in_used, MSG_DONTWAIT);
+    ssize_t n = recv(connection->fd, connection->in, sizeof connection->in, MSG_DONTWAIT);
 
     if (n > 0) {
-        connection->in_used += (size_t)n;
+        connection->in_at = 0;
+        connection->in_used = (size_t)n;
         acknowledge_at_once(connection->fd);
         consume(connection);
     } else if (n == 0 || (errno != EAGAIN && errno != EINTR) || (connection->broken && errno == EAGAIN)) {
@@ -581,6 +424,7 @@ static connection_t *connect_client(socketcand_server_t *server, int fd, const c
     connection->server = server;
     connection->fd = fd;
     connection->watch = EPOLLIN;
+    connection->splitter.longest = SOCKETCAND_ELEMENT_MAX - 2; /* without "<" and ">" */
     connection->port = sim_bus_attach(server->bus, on_frame, connection);
     if (connection->port < 0) {
         *wrong = "< error bus full >";
@@ -616,79 +460,28 @@ static void welcome(socketcand_server_t *server, int fd)
     settle(connection);
 }
 
-/* Descriptors have run out. A client that waits in the backlog would wake the loop without end: it is
- * accepted with the spare descriptor and closed. False: that did not help. */
-static bool turn_away(socketcand_server_t *server)
-{
-    int fd;
-
-    if (server->spare_fd < 0) {
-        return false;
-    }
-    close(server->spare_fd);
-    fd = accept4(server->listen_fd, NULL, NULL, SOCK_CLOEXEC);
-    if (fd >= 0) {
-        close(fd);
-    }
-    server->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    return fd >= 0;
-}
-
 static void on_listen(void *ctx, uint32_t events)
 {
     socketcand_server_t *server = ctx;
-    bool more = true;
+    int fd;
 
     (void)events;
-    while (more) {
-        int fd = accept4(server->listen_fd, NULL, NULL, SOCK_NONBLOCK | SOCK_CLOEXEC);
-
-        if (fd >= 0) {
-            welcome(server, fd);
-        } else {
-            more = (errno == EMFILE || errno == ENFILE) && turn_away(server);
-        }
+    while ((fd = tcp_listener_accept(&server->listener)) >= 0) {
+        welcome(server, fd);
     }
     tell_news(server);
 }
 
 /* ---- The server ---- */
 
-/* Returns the listening socket, or -1: errno says why. */
-static int open_listener(uint16_t port)
-{
-    struct sockaddr_in address = {
-        .sin_family = AF_INET, .sin_port = htons(port), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
-    int on = 1;
-    int fd = socket(AF_INET, SOCK_STREAM | SOCK_NONBLOCK | SOCK_CLOEXEC, 0);
-
-    if (fd < 0) {
-        return -1;
-    }
-    if (setsockopt(fd, SOL_SOCKET, SO_REUSEADDR, &on, sizeof on) != 0 ||
-        bind(fd, (const struct sockaddr *)&address, sizeof address) != 0 || listen(fd, LISTEN_BACKLOG) != 0) {
-        int reason = errno;
-
-        close(fd);
-        errno = reason;
-        return -1;
-    }
-    return fd;
-}
-
 /* False: errno says why; what was opened is left to socketcand_server_close. */
 static bool open_descriptors(socketcand_server_t *server, uint16_t port)
 {
-    server->listen_fd = open_listener(port);
-    if (server->listen_fd < 0) {
+    if (!tcp_listener_open(&server->listener, port)) {
         return false;
     }
     server->timer = oneshot_open(server->loop, on_hold_over, server);
-    if (server->timer < 0) {
-        return false;
-    }
-    server->spare_fd = open("/dev/null", O_RDONLY | O_CLOEXEC);
-    return server->spare_fd >= 0 && loop_add(server->loop, server->listen_fd, EPOLLIN, on_listen, server);
+    return server->timer >= 0 && loop_add(server->loop, server->listener.fd, EPOLLIN, on_listen, server);
 }
 
 socketcand_server_t *socketcand_server_open(loop_t *loop, sim_bus_t *bus, uint16_t port,
@@ -705,8 +498,7 @@ socketcand_server_t *socketcand_server_open(loop_t *loop, sim_bus_t *bus, uint16
     server->bus = bus;
     server->changed = changed;
     server->ctx = ctx;
-    server->listen_fd = -1;
-    server->spare_fd = -1;
+    server->listener = TCP_LISTENER_CLOSED;
     server->timer = -1;
     if (!open_descriptors(server, port)) {
         snprintf(error, error_size, "127.0.0.1:%u: %s", (unsigned)port, strerror(errno));
@@ -736,15 +528,12 @@ void socketcand_server_close(socketcand_server_t *server)
             drop_connection(server->connections[i]);
         }
     }
-    if (server->listen_fd >= 0) {
-        loop_remove(server->loop, server->listen_fd);
-        close(server->listen_fd);
+    if (server->listener.fd >= 0) {
+        loop_remove(server->loop, server->listener.fd);
     }
+    tcp_listener_close(&server->listener);
     if (server->timer >= 0) {
         oneshot_close(server->loop, server->timer);
-    }
-    if (server->spare_fd >= 0) {
-        close(server->spare_fd);
     }
     free(server);
 }
@@ -768,11 +557,7 @@ bool socketcand_server_poll(socketcand_server_t *server)
 
 uint16_t socketcand_server_port(const socketcand_server_t *server)
 {
-    struct sockaddr_in address = {.sin_port = 0};
-    socklen_t size = sizeof address;
-
-    (void)getsockname(server->listen_fd, (struct sockaddr *)&address, &size);
-    return ntohs(address.sin_port);
+    return tcp_listener_port(&server->listener);
 }
 
 socketcand_stats_t socketcand_server_stats(const socketcand_server_t *server)

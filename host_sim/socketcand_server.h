@@ -1,17 +1,20 @@
 /* Lets other processes join the simulated bus: a TCP server on 127.0.0.1 that speaks the socketcand protocol,
  * raw mode. Each connection is one port of the bus.
  *
- * On the wire, as python-can's client has it (server: >, client: <):
- *   > < hi >      < < open NAME >      > < ok >      < < rawmode >      > < ok >
- *   < < send 123 3 1 22 33 >           one or two hexadecimal digits a byte; any bus name is accepted
- *   > < frame 123 23.424242 012233 >   data as one hexadecimal word, identifiers with three digits; the time
- * is the bus time at the end of the frame, seconds and six decimals < < echo >    > < echo >           at any
- * time An identifier of one to three digits is a base frame, one of four to eight digits an extended frame,
- * whose identifier the bus does not keep: it comes out as 00000000. A frame without data has two spaces
- * before its
- * ">", which python-can needs. A frame is not echoed to the connection that sent it. A malformed element gets
- * < error TEXT > and is counted; the connection stays. Remote, error and CAN FD frames of the bus have no
- * element here and are counted in frames_unsupported.
+ * On the wire, as python-can's client has it; socketcand_text.h describes the elements of frames:
+ *
+ *   server                           client
+ *   < hi >                           < open NAME >        any bus name is accepted
+ *   < ok >                           < rawmode >
+ *   < ok >                           < send 123 3 1 22 33 >
+ *   < frame 123 23.424242 012233 >
+ *   < echo >                         < echo >             at any time
+ *   < error TEXT >                                        answers a malformed element
+ *
+ * The time of a frame is the bus time at its end. The bus does not keep the identifier of an extended frame:
+ * it comes out as 00000000. A frame is not echoed to the connection that sent it. A malformed element is
+ * counted; the connection stays. Remote, error and CAN FD frames of the bus have no element here and are
+ * counted in frames_unsupported.
  *
  * No frame of a client is lost: while the queue of its port is full the server does not read from the
  * connection, and a connection that the client has closed keeps its port until its frames are on the wire.
@@ -54,10 +57,13 @@ socketcand_server_t *socketcand_server_open(loop_t *loop, sim_bus_t *bus, uint16
 /* Closes every connection; what waits in their queues is forgotten. NULL does nothing. */
 void socketcand_server_close(socketcand_server_t *server);
 
-/* To be called after each sim_bus_step and not inside it: writes to the clients what has arrived, and takes
- * up the reading that a full queue had stopped. True: it has put frames on the bus, sim_bus_step is due
- * again. Does not call changed. Costs next to nothing when nothing is pending. In use: do { deadline_us =
- * sim_bus_step(bus, now_us); } while (socketcand_server_poll(server)); */
+/* Writes to the clients what has arrived, and takes up the reading that a full queue had stopped. To be
+ * called after each sim_bus_step and not inside it. True: it has put frames on the bus, sim_bus_step is due
+ * again. Does not call changed. Costs next to nothing when nothing is pending. In use:
+ *
+ *   do {
+ *       deadline_us = sim_bus_step(bus, now_us);
+ *   } while (socketcand_server_poll(server)); */
 bool socketcand_server_poll(socketcand_server_t *server);
 
 uint16_t socketcand_server_port(const socketcand_server_t *server);

@@ -112,8 +112,8 @@ static uint16_t enter_configuration(void)
     return rounds;
 }
 
-/* Peripheral indirect: the controller says which buffer, the buffers' common address has zeros in those bits.
- */
+/* Peripheral indirect: the controller says which buffer, the buffers' common address has zeros in those
+ * bits. */
 static void start_dma(void)
 {
     PART_DMA_PREPARE();

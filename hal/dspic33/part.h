@@ -1,6 +1,6 @@
 /* The part that is built for. All that differs between the parts stands in the one header that this one
- * includes; what they have in common is used by the drivers under the register names of the vendor's headers.
- */
+ * includes; what they have in common is used by the drivers under the register names of the vendor's
+ * headers. */
 #ifndef PART_H
 #define PART_H
 
@@ -19,8 +19,8 @@
 /* An interrupt handler. None reads constants, which stand in flash, so none needs the window to flash. */
 #define PART_HANDLER __attribute__((interrupt, no_auto_psv))
 
-/* A function of a handler: the compiler is to put it there, at -O1 too, where it does no inlining of its own.
- */
+/* A function of a handler: the compiler is to put it there, at -O1 too, where it does no inlining of its
+ * own. */
 #define PART_INLINE static inline __attribute__((always_inline))
 
 /* RAM that a reset leaves alone. */

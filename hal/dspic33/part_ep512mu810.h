@@ -11,8 +11,8 @@
 #define PART_PLL_VCO_MIN 120000000uL
 #define PART_PLL_VCO_MAX 340000000uL
 
-/* ECAN is clocked with the instruction rate: CANCKS = 0 here, the other way round than in the smaller part.
- */
+/* ECAN is clocked with the instruction rate: CANCKS = 0 here, the other way round than in the smaller
+ * part. */
 #define PART_CAN_CANCKS 0
 
 /* Frames in the receive ring, a power of two, 128 at most. */

@@ -4,7 +4,8 @@
 
 static hal_can_t *can_gs_usb_open(const linux_can_request_t *request)
 {
-    linux_can_refuse(request, "this program was built without USB adapters: libusb-1.0 was not there");
+    linux_can_backend_refuse(request,
+                             "this program was built without USB adapters: libusb-1.0 was not there");
     return NULL;
 }
 

@@ -11,8 +11,7 @@
 #include <unistd.h>
 
 #define REPLY_MAX 16384
-#define REPLY_TIMEOUT_US                                                                                     \
-    200000 /* the kernel answers within the send; this is for the case that it does not */
+#define REPLY_TIMEOUT_US 200000 /* the kernel answers within the send; this is for when it does not */
 
 int can_link_open(void)
 {

@@ -386,17 +386,17 @@ static bool first_attach(can_socketcan_t *can, const linux_can_request_t *reques
     can_link_t link;
     int lack = probe_kernel();
     if (!can_link_find(can->link_fd, can->name, &link)) {
-        linux_can_refuse(request, lack == EAFNOSUPPORT
-                                      ? "no such network interface, and this kernel has no CAN"
-                                      : "no such network interface");
+        linux_can_backend_refuse(request, lack == EAFNOSUPPORT
+                                              ? "no such network interface, and this kernel has no CAN"
+                                              : "no such network interface");
         return false;
     }
     if (!link.is_can) {
-        linux_can_refuse(request, "not a CAN interface");
+        linux_can_backend_refuse(request, "not a CAN interface");
         return false;
     }
     if (lack != 0 || (link.up && !attach(can, link.index))) {
-        linux_can_refuse(request, reason_of(lack != 0 ? lack : errno));
+        linux_can_backend_refuse(request, reason_of(lack != 0 ? lack : errno));
         return false;
     }
     return true;
@@ -426,15 +426,15 @@ static hal_can_t *can_socketcan_open(const linux_can_request_t *request)
 {
     size_t length = strlen(request->address);
     if (length == 0 || length >= IFNAMSIZ) {
-        linux_can_refuse(request, "no such network interface");
+        linux_can_backend_refuse(request, "no such network interface");
         return NULL;
     }
     can_socketcan_t *can = calloc(1, sizeof *can);
     if (can == NULL) {
-        linux_can_refuse(request, strerror(errno));
+        linux_can_backend_refuse(request, strerror(errno));
         return NULL;
     }
-    linux_can_init(&can->base, &can_socketcan_backend, request);
+    linux_can_backend_init(&can->base, &can_socketcan_backend, request);
     memcpy(can->name, request->address, length);
     can->fd = -1;
     can->timer = -1;
@@ -442,7 +442,7 @@ static hal_can_t *can_socketcan_open(const linux_can_request_t *request)
     prepare_messages(can);
     bool ready = prepare(can);
     if (!ready) {
-        linux_can_refuse(request, strerror(errno));
+        linux_can_backend_refuse(request, strerror(errno));
     }
     if (!ready || !first_attach(can, request)) {
         can_socketcan_close(&can->base);

@@ -14,11 +14,11 @@
 
 #include "linux_can_backend.h"
 #include "oneshot.h"
+#include "socketcand_text.h"
 
 #define HOST_BYTES 256
 #define PORT_BYTES 8
 #define NAME_BYTES 64
-#define ELEMENT_BYTES 256 /* a frame takes 45 */
 #define INPUT_BYTES 4096
 #define OUTPUT_BYTES 128
 #define HANDSHAKE_LIMIT_US 2000000u
@@ -48,10 +48,7 @@ typedef struct {
     char input[INPUT_BYTES]; /* as read, parsed up to input_at */
     size_t input_at;
     size_t input_size;
-    char element[ELEMENT_BYTES]; /* what stands between < and > so far */
-    size_t element_size;
-    bool in_element;
-    bool element_too_long;
+    socketcand_text_splitter_t splitter;
 
     char output[OUTPUT_BYTES]; /* what the kernel has not taken yet of the last element */
     size_t output_at;
@@ -59,7 +56,7 @@ typedef struct {
     bool output_is_frame;
     bool lost; /* noticed in a call from outside the loop; acted on inside it */
 
-    char failure[ELEMENT_BYTES + 32]; /* why the last attempt failed */
+    char failure[SOCKETCAND_TEXT_MAX + 33]; /* why the last attempt failed */
 } can_socketcand_t;
 
 static void on_event(void *ctx, uint32_t events);
@@ -129,10 +126,10 @@ static bool flush_output(can_socketcand_t *can)
 }
 
 /* Sends the element that has been written to output, size characters. */
-static bool put_element(can_socketcand_t *can, int size)
+static bool put_element(can_socketcand_t *can, size_t size)
 {
     can->output_at = 0;
-    can->output_size = (size_t)size;
+    can->output_size = size;
     can->output_is_frame = can->state == STATE_RAW;
     return flush_output(can);
 }
@@ -148,178 +145,70 @@ static bool fill_input(can_socketcand_t *can)
     return n > 0 || (n < 0 && (errno == EAGAIN || errno == EINTR));
 }
 
-/* Adds a character to the element; true: it is complete. Whatever stands outside < and > is skipped, and a <
- * inside starts afresh, so that one mangled element spoils no other. */
-static bool take_character(can_socketcand_t *can, char c)
-{
-    if (c == '<') {
-        can->in_element = true;
-        can->element_too_long = false;
-        can->element_size = 0;
-        return false;
-    }
-    if (!can->in_element) {
-        return false;
-    }
-    if (c == '>') {
-        can->in_element = false;
-        can->element[can->element_size] = '\0';
-        return true;
-    }
-    if (can->element_size < sizeof can->element - 1) {
-        can->element[can->element_size++] = isprint((unsigned char)c) ? c : ' ';
-    } else {
-        can->element_too_long = true;
-    }
-    return false;
-}
-
 static bool next_element(can_socketcand_t *can)
 {
     while (can->input_at < can->input_size) {
-        if (take_character(can, can->input[can->input_at++])) {
+        char c = can->input[can->input_at++];
+        if (!isprint((unsigned char)c)) {
+            c = ' '; /* the user may be shown the element */
+        }
+        if (socketcand_text_take(&can->splitter, c) == SOCKETCAND_TEXT_ELEMENT) {
             return true;
         }
     }
     return false;
-}
-
-/* Takes the next word off *at; it ends at a blank. Returns its length, 0 at the end. */
-static size_t next_word(const char **at, const char **word)
-{
-    const char *p = *at;
-    while (*p == ' ') {
-        p++;
-    }
-    *word = p;
-    while (*p != ' ' && *p != '\0') {
-        p++;
-    }
-    *at = p;
-    return (size_t)(p - *word);
-}
-
-static bool word_is(const char *word, size_t length, const char *expected)
-{
-    return length == strlen(expected) && memcmp(word, expected, length) == 0;
-}
-
-static int hex_digit(char c)
-{
-    if (c >= '0' && c <= '9') {
-        return c - '0';
-    }
-    if (c >= 'a' && c <= 'f') {
-        return c - 'a' + 10;
-    }
-    return c >= 'A' && c <= 'F' ? c - 'A' + 10 : -1;
-}
-
-static bool parse_hex(const char *word, size_t length, uint32_t *value)
-{
-    *value = 0;
-    for (size_t i = 0; i < length; i++) {
-        int digit = hex_digit(word[i]);
-        if (digit < 0) {
-            return false;
-        }
-        *value = *value << 4 | (uint32_t)digit;
-    }
-    return length >= 1 && length <= 8;
-}
-
-/* Pairs of digits with or without blanks between them, to the end. More than eight bytes make it an FD frame.
- */
-static bool parse_data(const char *at, can_frame_t *frame)
-{
-    size_t bytes = 0;
-    const char *word;
-    size_t length;
-    while ((length = next_word(&at, &word)) > 0) {
-        for (size_t i = 0; i < length; i += 2, bytes++) {
-            uint32_t value;
-            if (i + 1 >= length || !parse_hex(word + i, 2, &value)) {
-                return false;
-            }
-            if (bytes < CAN_FRAME_DATA_MAX) {
-                frame->data[bytes] = (uint8_t)value;
-            }
-        }
-    }
-    if (bytes > CAN_FRAME_DATA_MAX) {
-        frame->kind = CAN_FRAME_FD;
-        frame->id = 0;
-    }
-    frame->dlc = (uint8_t)(bytes > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : bytes);
-    return true;
-}
-
-/* frame ID TIME DATA: an identifier of three digits is a base one. */
-static bool parse_frame(const char *at, can_frame_t *frame)
-{
-    const char *word;
-    uint32_t id;
-    size_t digits = next_word(&at, &word);
-    if (!parse_hex(word, digits, &id) || (digits <= 3 && id > CAN_FRAME_ID_MAX)) {
-        return false;
-    }
-    frame->kind = digits > 3 ? CAN_FRAME_EXTENDED : CAN_FRAME_BASE;
-    frame->id = digits > 3 ? 0 : (uint16_t)id;
-    return next_word(&at, &word) > 0 && parse_data(at, frame);
-}
-
-/* error ID TIME is the report of a controller; any other text is the server's answer to an element that it
- * did not like, and all it gets in raw mode are frames to send. */
-static bool parse_error(const char *at)
-{
-    const char *id;
-    const char *time;
-    uint32_t value;
-    size_t id_length = next_word(&at, &id);
-    size_t time_length = next_word(&at, &time);
-    return parse_hex(id, id_length, &value) && time_length > 0 && memchr(time, '.', time_length) != NULL;
 }
 
 /* Makes a frame of the complete element. False: it is none. */
 static bool take_frame(can_socketcand_t *can, can_frame_t *frame)
 {
-    const char *at = can->element;
-    const char *word;
-    size_t length = next_word(&at, &word);
-    *frame = (can_frame_t){0};
-    if (word_is(word, length, "frame")) {
-        if (!can->element_too_long && parse_frame(at, frame)) {
+    socketcand_text_t rest = socketcand_text_element(&can->splitter);
+    socketcand_text_t name;
+    (void)socketcand_text_next(&rest, &name);
+    if (socketcand_text_is(name, "frame")) {
+        if (!can->splitter.cut && socketcand_text_parse_frame(rest, frame)) {
             return true;
         }
         can->base.health.rx_overruns++;
-    } else if (word_is(word, length, "error")) {
-        if (parse_error(at)) {
-            frame->kind = CAN_FRAME_ERROR;
+    } else if (socketcand_text_is(name, "error")) {
+        if (socketcand_text_parse_error(rest)) {
+            *frame = (can_frame_t){.kind = CAN_FRAME_ERROR};
             return true;
         }
-        can->base.health.tx_failed++;
+        can->base.health.tx_failed++; /* all that a server gets in raw mode are frames to send */
     }
     return false;
 }
 
 /* --- the handshake --- */
 
-static bool answer_greeting(can_socketcand_t *can, const char *word, size_t length)
+static bool answer_greeting(can_socketcand_t *can, socketcand_text_t word)
 {
-    if (word_is(word, length, "hi") && can->state == STATE_GREETING) {
+    if (socketcand_text_is(word, "hi") && can->state == STATE_GREETING) {
         can->state = STATE_OPENING;
-        return put_element(can, snprintf(can->output, sizeof can->output, "< open %s >", can->name));
+        return put_element(can, (size_t)snprintf(can->output, sizeof can->output, "< open %s >", can->name));
     }
-    if (word_is(word, length, "ok") && can->state == STATE_OPENING) {
+    if (socketcand_text_is(word, "ok") && can->state == STATE_OPENING) {
         can->state = STATE_SWITCHING;
-        return put_element(can, snprintf(can->output, sizeof can->output, "< rawmode >"));
+        return put_element(can, (size_t)snprintf(can->output, sizeof can->output, "< rawmode >"));
     }
-    if (word_is(word, length, "ok") && can->state == STATE_SWITCHING) {
+    if (socketcand_text_is(word, "ok") && can->state == STATE_SWITCHING) {
         can->state = STATE_RAW;
         can->backoff_us = BACKOFF_MIN_US;
         can->base.health.state = HAL_CAN_ACTIVE;
     }
     return true;
+}
+
+/* The server refuses the bus. text: what follows the word "error". */
+static void take_refusal(can_socketcand_t *can, socketcand_text_t text)
+{
+    char reason[sizeof can->failure];
+    while (text.length > 0 && text.text[text.length - 1] == ' ') {
+        text.length--;
+    }
+    snprintf(reason, sizeof reason, "the server says:%.*s", (int)text.length, text.text);
+    disconnect(can, reason);
 }
 
 /* Works through the elements that have come, up to raw mode. What follows then is left in the input. */
@@ -330,20 +219,14 @@ static void shake_hands(can_socketcand_t *can)
         return;
     }
     while (can->state != STATE_RAW && next_element(can)) {
-        const char *at = can->element;
-        const char *word;
-        size_t length = next_word(&at, &word);
-        if (word_is(word, length, "error")) {
-            int size = (int)strlen(at);
-            while (size > 0 && at[size - 1] == ' ') {
-                size--;
-            }
-            char reason[sizeof can->failure];
-            snprintf(reason, sizeof reason, "the server says:%.*s", size, at);
-            disconnect(can, reason);
+        socketcand_text_t rest = socketcand_text_element(&can->splitter);
+        socketcand_text_t word;
+        (void)socketcand_text_next(&rest, &word);
+        if (socketcand_text_is(word, "error")) {
+            take_refusal(can, rest);
             return;
         }
-        if (!answer_greeting(can, word, length)) {
+        if (!answer_greeting(can, word)) {
             disconnect(can, strerror(errno));
             return;
         }
@@ -463,14 +346,7 @@ static bool can_socketcand_send(hal_can_t *base, const can_frame_t *frame)
     if (can->state != STATE_RAW || can->output_at < can->output_size) {
         return false;
     }
-    unsigned dlc = frame->dlc > CAN_FRAME_DATA_MAX ? CAN_FRAME_DATA_MAX : frame->dlc;
-    char data[3 * CAN_FRAME_DATA_MAX + 1] = "";
-    for (unsigned i = 0, at = 0; i < dlc; i++) {
-        at += (unsigned)snprintf(data + at, sizeof data - at, " %X", frame->data[i]);
-    }
-    const int size = snprintf(can->output, sizeof can->output, "< send %03X %u%s >",
-                              frame->id & CAN_FRAME_ID_MAX, dlc, data);
-    if (put_element(can, size)) {
+    if (put_element(can, socketcand_text_format_send(can->output, sizeof can->output, frame))) {
         return true;
     }
     can->output_size = 0; /* not taken; epoll reports the lost connection */
@@ -584,16 +460,18 @@ static hal_can_t *can_socketcand_open(const linux_can_request_t *request)
 {
     can_socketcand_t *can = calloc(1, sizeof *can);
     if (can == NULL) {
-        linux_can_refuse(request, strerror(errno));
+        linux_can_backend_refuse(request, strerror(errno));
         return NULL;
     }
-    linux_can_init(&can->base, &can_socketcand_backend, request);
+    linux_can_backend_init(&can->base, &can_socketcand_backend, request);
     can->fd = -1;
     can->timer = -1;
     can->backoff_us = BACKOFF_MIN_US;
+    can->splitter.longest = SOCKETCAND_TEXT_MAX;
+    can->splitter.restarts = true;
     const char *reason = start(can, request->address);
     if (reason != NULL) {
-        linux_can_refuse(request, reason);
+        linux_can_backend_refuse(request, reason);
         can_socketcand_close(&can->base);
         return NULL;
     }

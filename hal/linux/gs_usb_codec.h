@@ -3,14 +3,21 @@
  *
  * All numbers are little-endian words of 32 bits where nothing else is said.
  *
- *   BT_CONST        features, clock in Hz, tseg1 min, tseg1 max, tseg2 min, tseg2 max, sjw max, brp min, brp
- * max, brp step BITTIMING       prop, phase1, phase2, sjw, brp MODE            0 reset, 1 start; flags, which
- * are features to be used DEVICE_CONFIG   three bytes, channels - 1 (one byte), software version, hardware
- * version GET_STATE       state, receive errors, transmit errors
+ *   BT_CONST        features, clock in Hz, tseg1 min, tseg1 max, tseg2 min, tseg2 max, sjw max, brp min,
+ *                   brp max, brp step
+ *   BITTIMING       prop, phase1, phase2, sjw, brp
+ *   MODE            0 reset, 1 start; flags, which are features to be used
+ *   DEVICE_CONFIG   three bytes, channels - 1 (one byte), software version, hardware version
+ *   GET_STATE       state, receive errors, transmit errors
  *
- *   host frame      0 echo tag, FFFFFFFFh for a received frame; 4 identifier, bit 31 extended, 30 remote, 29
- * error; 8 DLC; 9 channel; 10 flags; 11 reserved; 12 eight data bytes; then perhaps a time stamp and padding
- */
+ *   host frame, by offset in bytes:
+ *    0   echo tag, FFFFFFFFh for a received frame
+ *    4   identifier, bit 31 extended, 30 remote, 29 error
+ *    8   DLC
+ *    9   channel
+ *   10   flags
+ *   11   reserved
+ *   12   eight data bytes; then perhaps a time stamp and padding */
 #ifndef GS_USB_CODEC_H
 #define GS_USB_CODEC_H
 
@@ -58,8 +65,8 @@ typedef struct {
     uint32_t brp_step;
 } gs_usb_codec_constants_t;
 
-/* Time quanta of a bit: 1 + prop + phase1 before the sample point, phase2 behind it; a quantum is brp clocks.
- */
+/* Time quanta of a bit: 1 + prop + phase1 before the sample point, phase2 behind it; a quantum is brp
+ * clocks. */
 typedef struct {
     uint32_t prop;
     uint32_t phase1;

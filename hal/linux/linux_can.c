@@ -10,20 +10,6 @@ static const linux_can_backend_t *const backends[] = {&can_socketcan_backend, &c
 
 #define BACKENDS (sizeof backends / sizeof backends[0])
 
-void linux_can_init(hal_can_t *can, const linux_can_backend_t *backend, const linux_can_request_t *request)
-{
-    can->backend = backend;
-    can->loop = request->loop;
-    can->ready = request->ready;
-    can->ctx = request->ctx;
-    can->health = (hal_can_health_t){.state = HAL_CAN_DOWN};
-}
-
-void linux_can_refuse(const linux_can_request_t *request, const char *reason)
-{
-    snprintf(request->error, request->error_size, "%s: %s", request->bus, reason);
-}
-
 /* What follows the kind in BUS and its colon; NULL: BUS is of another kind. */
 static const char *address_in(const char *bus, const linux_can_backend_t *backend)
 {
@@ -49,7 +35,7 @@ hal_can_t *linux_can_open(loop_t *loop, const char *bus, linux_can_ready_t ready
             return backends[i]->open(&request);
         }
     }
-    linux_can_refuse(&request, "not a CAN bus; expected one of " LINUX_CAN_CHOICES);
+    linux_can_backend_refuse(&request, "not a CAN bus; expected one of " LINUX_CAN_CHOICES);
     return NULL;
 }
 

@@ -1,14 +1,15 @@
 /* Opening a CAN bus on Linux. What can be done with it then stands in hal_can.h.
  *
  * BUS is one of
+ *
  *   socketcan:IFACE             an interface of the kernel, such as socketcan:can0 or socketcan:vcan0
  *   socketcand:HOST:PORT/NAME   a socketcand server, raw mode, such as socketcand:127.0.0.1:28600/sim
  *   gs_usb[:SERIAL][/CHANNEL]   a USB adapter without a driver of the kernel: the first one or the one with
  *                               this serial number; its first channel is 0. Absent without libusb
+ *
  * A bus that goes away later (interface down or gone, connection lost, adapter pulled out) is no reason to
  * open anew: the state becomes HAL_CAN_DOWN, nothing is received, hal_can_send answers false, and when the
- * bus is back it goes on.
- */
+ * bus is back it goes on. */
 #ifndef LINUX_CAN_H
 #define LINUX_CAN_H
 

@@ -1,3 +1,5 @@
+#include "linux_uart.h"
+
 #include <stdio.h>
 #include <string.h>
 
@@ -6,20 +8,6 @@
 static const linux_uart_backend_t *const backends[] = {&linux_uart_pty_backend, &linux_uart_serial_backend};
 
 #define BACKENDS (sizeof backends / sizeof backends[0])
-
-void linux_uart_init(hal_uart_t *uart, const linux_uart_backend_t *backend,
-                     const linux_uart_request_t *request)
-{
-    uart->backend = backend;
-    uart->loop = request->loop;
-    uart->ready = request->ready;
-    uart->ctx = request->ctx;
-}
-
-void linux_uart_refuse(const linux_uart_request_t *request, const char *reason)
-{
-    snprintf(request->error, request->error_size, "%s: %s", request->port, reason);
-}
 
 /* Does PORT name this kind, with an address unless there need be none? */
 static bool names(const char *port, const linux_uart_backend_t *backend)
@@ -43,7 +31,8 @@ hal_uart_t *linux_uart_open(loop_t *loop, const char *port, linux_uart_ready_t r
             return backends[i]->open(&request);
         }
     }
-    linux_uart_refuse(&request, "not a host port; expected pty, pty:LINKPATH or serial:DEVICE[@BAUD]");
+    linux_uart_backend_refuse(&request,
+                              "not a host port; expected pty, pty:LINKPATH or serial:DEVICE[@BAUD]");
     return NULL;
 }
 

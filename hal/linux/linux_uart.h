@@ -3,9 +3,10 @@
  * PORT is one of
  *
  *   pty, pty:LINKPATH       a new pseudo-terminal in raw mode; with LINKPATH a symbolic link to it is made,
- * replacing a stale one (to a terminal that does not exist any more), and removed at the end. Nothing else is
- * ever replaced. serial:DEVICE[@BAUD]    a serial line, raw, 8N1, for this program alone; any rate that the
- * driver can make, 128000 when none is given. While its adapter is pulled out there is no host.
+ *                           replacing a stale one (to a terminal that does not exist any more), and removed
+ *                           at the end. Nothing else is ever replaced
+ *   serial:DEVICE[@BAUD]    a serial line, raw, 8N1, for this program alone; any rate that the driver can
+ *                           make, 128000 when none is given. While its adapter is pulled out there is no host
  *
  * When the last host of a pseudo-terminal closes its end, what it has not read is thrown away and the end is
  * put back into raw mode. A host that reopens before the loop has come round may still find bytes that were

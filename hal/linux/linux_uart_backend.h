@@ -6,7 +6,11 @@
 #include <stdbool.h>
 #include <stddef.h>
 
-#include "linux_uart.h"
+#include "hal_uart.h"
+#include "loop.h"
+
+/* Called as a linux_uart_ready_t; linux_uart.h is built upon this header, which does not include it. */
+typedef void (*linux_uart_backend_ready_t)(void *ctx);
 
 /* Arguments of linux_uart_open with PORT taken apart. All pointers are valid during open only, but for loop
  * and ctx. */
@@ -14,13 +18,14 @@ typedef struct {
     loop_t *loop;
     const char *port;    /* as the user wrote it, for messages */
     const char *address; /* what follows the kind and its colon; NULL: nothing */
-    linux_uart_ready_t ready;
+    linux_uart_backend_ready_t ready;
     void *ctx;
     char *error;
     size_t error_size;
 } linux_uart_request_t;
 
-/* The functions are those of hal_uart.h and linux_uart.h. open returns NULL after linux_uart_refuse. */
+/* The functions are those of hal_uart.h and linux_uart.h. open returns NULL after
+ * linux_uart_backend_refuse. */
 typedef struct {
     const char *kind;
     bool needs_address;
@@ -34,7 +39,7 @@ typedef struct {
 struct hal_uart {
     const linux_uart_backend_t *backend;
     loop_t *loop;
-    linux_uart_ready_t ready;
+    linux_uart_backend_ready_t ready;
     void *ctx;
     bool host_left; /* since linux_uart_host_left was asked */
 };
@@ -42,10 +47,10 @@ struct hal_uart {
 extern const linux_uart_backend_t linux_uart_pty_backend;
 extern const linux_uart_backend_t linux_uart_serial_backend;
 
-void linux_uart_init(hal_uart_t *uart, const linux_uart_backend_t *backend,
-                     const linux_uart_request_t *request);
+void linux_uart_backend_init(hal_uart_t *uart, const linux_uart_backend_t *backend,
+                             const linux_uart_request_t *request);
 
 /* Writes "PORT: reason" to the caller's error[]. */
-void linux_uart_refuse(const linux_uart_request_t *request, const char *reason);
+void linux_uart_backend_refuse(const linux_uart_request_t *request, const char *reason);
 
 #endif

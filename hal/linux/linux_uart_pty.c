@@ -118,8 +118,8 @@ static const char *pty_path(const hal_uart_t *uart)
     return ((const pty_t *)uart)->path;
 }
 
-/* A link to a terminal that exists is somebody's: a second program must not take a running one's host away.
- */
+/* A link to a terminal that exists is somebody's: a second program must not take a running one's host
+ * away. */
 static bool is_stale_link(const char *path)
 {
     struct stat status;
@@ -200,13 +200,13 @@ static hal_uart_t *pty_open(const linux_uart_request_t *request)
 {
     pty_t *pty = calloc(1, sizeof *pty);
     if (pty == NULL) {
-        linux_uart_refuse(request, strerror(errno));
+        linux_uart_backend_refuse(request, strerror(errno));
         return NULL;
     }
-    linux_uart_init(&pty->uart, &linux_uart_pty_backend, request);
+    linux_uart_backend_init(&pty->uart, &linux_uart_pty_backend, request);
     pty->fd = -1;
     if (!open_all(pty, request->address)) {
-        linux_uart_refuse(request, reason_of(request->address));
+        linux_uart_backend_refuse(request, reason_of(request->address));
         pty_close(&pty->uart);
         return NULL;
     }

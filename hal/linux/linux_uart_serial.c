@@ -207,7 +207,7 @@ static serial_t *create(const linux_uart_request_t *request, size_t path_length,
     if (serial == NULL) {
         return NULL;
     }
-    linux_uart_init(&serial->uart, &linux_uart_serial_backend, request);
+    linux_uart_backend_init(&serial->uart, &linux_uart_serial_backend, request);
     memcpy(serial->path, request->address, path_length);
     serial->baud = baud;
     serial->fd = -1;
@@ -223,7 +223,7 @@ static hal_uart_t *serial_open(const linux_uart_request_t *request)
     if (!parse(request->address, &path_length, &baud)) {
         char text[80];
         (void)snprintf(text, sizeof text, "the baud rate is not a number from %d to %d", BAUD_MIN, BAUD_MAX);
-        linux_uart_refuse(request, text);
+        linux_uart_backend_refuse(request, text);
         return NULL;
     }
     serial_t *serial = create(request, path_length, baud);
@@ -236,7 +236,7 @@ static hal_uart_t *serial_open(const linux_uart_request_t *request)
         }
     }
     if (reason != NULL) {
-        linux_uart_refuse(request, reason);
+        linux_uart_backend_refuse(request, reason);
         if (serial != NULL) {
             serial_close(&serial->uart);
         }

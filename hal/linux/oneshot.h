@@ -1,5 +1,5 @@
-/* A timer of its own for a module that must not touch the loop's one deadline. It fires once for each arming.
- */
+/* A timer of its own for a module that must not touch the loop's one deadline. It fires once for each
+ * arming. */
 #ifndef ONESHOT_H
 #define ONESHOT_H
 
@@ -8,8 +8,8 @@
 
 #include "loop.h"
 
-/* Returns a descriptor watched by the loop, not armed, or -1 (errno says why). handler runs at each expiry.
- */
+/* Returns a descriptor watched by the loop, not armed, or -1 (errno says why). handler runs at each
+ * expiry. */
 int oneshot_open(loop_t *loop, loop_handler_t handler, void *ctx);
 void oneshot_close(loop_t *loop, int timer);
 

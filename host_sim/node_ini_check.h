@@ -1,0 +1,11 @@
+/* What only the whole of a device description shows. Private to node_ini*.c. */
+#ifndef NODE_INI_CHECK_H
+#define NODE_INI_CHECK_H
+
+#include "node_ini_reader.h"
+
+/* Judges the file when all of it has been read, takes its drafts, and completes the description. False: the
+ * reader has failed. */
+bool node_ini_check(node_ini_reader_t *reader);
+
+#endif

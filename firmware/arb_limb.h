@@ -8,8 +8,8 @@
 #include <stdint.h>
 
 #include "arb_config.h"
+#include "arb_error.h"
 #include "arb_flags.h"
-#include "arb_hostcodec.h"
 #include "pdcp_arb.h"
 #include "profile_run.h"
 

@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bytes.h"
+
 /* What has been declared: bits of state. */
 enum {
     TLV_CONFIGURATIONS = 0x01, /* code 1 */
@@ -186,7 +188,7 @@ profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *byte
         reader->entry[reader->have++] = *bytes++;
         if (reader->have == PROFILE_TLV_ENTRY_BYTES) {
             reader->have = 0;
-            const uint16_t value = pdcp_value_u16(reader->entry, PROFILE_TLV_ENTRY_BYTES, 1);
+            const uint16_t value = pdcp_bytes_value_u16(reader->entry, PROFILE_TLV_ENTRY_BYTES, 1);
             reader->status = (int8_t)read_entry(reader, reader->entry[0], value);
         }
     }
@@ -196,7 +198,7 @@ profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *byte
 void profile_tlv_put(uint8_t bytes[PROFILE_TLV_ENTRY_BYTES], uint8_t code, uint16_t value)
 {
     bytes[0] = code;
-    pdcp_put_u16(&bytes[1], value);
+    pdcp_bytes_put_u16(&bytes[1], value);
 }
 
 void profile_tlv_put_link_entry(uint8_t bytes[PROFILE_TLV_ENTRY_BYTES], uint8_t index,

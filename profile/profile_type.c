@@ -1,5 +1,7 @@
 #include "profile_type.h"
 
+#include "pdcp_bytes.h"
+
 /* Distance of a field's lowest bit from the least significant bit of the word. */
 enum { SIZE_AT = 14, DATA_AT = 12, CONTROL_AT = 10, PRESCALER_AT = 5 };
 
@@ -60,8 +62,7 @@ uint8_t profile_type_put(const profile_type_t *type, int32_t value, uint8_t byte
     value = value < min ? min : value;
     value = value > max ? max : value;
     const uint16_t word = (uint16_t)((uint32_t)value & mask_of(type));
-    bytes[0] = (uint8_t)(word & 0xFFu);
-    bytes[1] = (uint8_t)(word >> 8);
+    pdcp_bytes_put_u16(bytes, word);
     return profile_type_bytes(type);
 }
 
@@ -72,11 +73,7 @@ bool profile_type_get(const profile_type_t *type, const uint8_t *bytes, uint8_t 
     if (!profile_type_range(type, &min, &max)) {
         return false;
     }
-    uint16_t word = len > 0 ? bytes[0] : 0;
-    if (len > 1) {
-        word = (uint16_t)(word | (uint16_t)bytes[1] << 8);
-    }
-    word &= mask_of(type);
+    const uint16_t word = pdcp_bytes_value_u16(bytes, len, 0) & mask_of(type);
     *value = word;
     if (type->data == PROFILE_BOOLEAN) {
         *value = word != 0 ? 1 : 0;

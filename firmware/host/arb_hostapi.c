@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "arb_error.h"
 #include "arb_hostcall.h"
 #include "pdcp_time.h"
 

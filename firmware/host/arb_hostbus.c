@@ -1,7 +1,9 @@
 /* Messages 2201h to 230Dh [API 3.3]. */
 #include <string.h>
 
+#include "arb_error.h"
 #include "arb_hostcall.h"
+#include "pdcp_bytes.h"
 #include "pdcp_time.h"
 
 enum { PASSTHROUGH = 15 }; /* bytes of the payload: dev, DLC, data */
@@ -23,8 +25,8 @@ static void put_info(arb_call_t *call, const pdcp_identity_t *identity, uint8_t 
                      uint16_t profile)
 {
     arb_host_put_channel(&call->answer[0], identity, index);
-    arb_host_put_u16(&call->answer[7], type);
-    arb_host_put_u16(&call->answer[9], profile);
+    pdcp_bytes_put_u16(&call->answer[7], type);
+    pdcp_bytes_put_u16(&call->answer[9], profile);
     call->answer_len = 11;
 }
 
@@ -178,7 +180,7 @@ static uint8_t broadcast(arb_call_t *call, uint8_t dlc, const uint8_t *data)
     if (call->arb->silent) {
         return ARB_ERR_NOT_READY;
     }
-    if (!pdcp_arb_broadcast(call->arb, data[0], arb_host_get_u16(&data[1]))) { /* Release has no time */
+    if (!pdcp_arb_broadcast(call->arb, data[0], pdcp_bytes_get_u16(&data[1]))) { /* Release has no time */
         return ARB_ERR_BUSY;
     }
     call->api->handed = true;

@@ -1,5 +1,6 @@
 #include "arb_hostcall.h"
 
+#include "pdcp_bytes.h"
 #include "pdcp_time.h"
 #include "profile_channel.h"
 
@@ -38,7 +39,7 @@ uint8_t arb_call_wait_ready(arb_call_t *call)
 
 uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
 {
-    const pdcp_identity_t identity = arb_host_get_identity(bytes);
+    const pdcp_identity_t identity = pdcp_bytes_get_identity(bytes);
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     const uint8_t place = pdcp_nodes_find(nodes, &identity);
     return pdcp_nodes_is_bound(nodes, place) ? place : (uint8_t)PDCP_NONE;

@@ -4,6 +4,7 @@
 #ifndef ARB_HOSTCALL_H
 #define ARB_HOSTCALL_H
 
+#include "arb_error.h"
 #include "arb_hostapi.h"
 
 /* What a handler says: an error code; ARB_OK, with a success payload of answer_len bytes; or that somebody

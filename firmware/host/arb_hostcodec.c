@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+#include "pdcp_bytes.h"
+
 static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
 {
     crc ^= byte;
@@ -42,60 +44,24 @@ uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len)
     return crc;
 }
 
-uint16_t arb_host_get_u16(const uint8_t *bytes)
-{
-    return (uint16_t)(bytes[0] | (uint16_t)((uint16_t)bytes[1] << 8));
-}
-
-void arb_host_put_u16(uint8_t *bytes, uint16_t value)
-{
-    bytes[0] = (uint8_t)(value & 0xFFu);
-    bytes[1] = (uint8_t)(value >> 8);
-}
-
-void arb_host_put_u32(uint8_t *bytes, uint32_t value)
-{
-    const uint16_t low = (uint16_t)(value & 0xFFFFu);
-    const uint16_t high = (uint16_t)(value >> 16);
-    bytes[0] = (uint8_t)(low & 0xFFu);
-    bytes[1] = (uint8_t)(low >> 8);
-    bytes[2] = (uint8_t)(high & 0xFFu);
-    bytes[3] = (uint8_t)(high >> 8);
-}
-
 uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)
 {
     const uint16_t size = len != 0 ? (uint16_t)(len + ARB_HOST_CRC) : 0;
     frame[0] = ARB_HOST_SYNC1;
     frame[1] = ARB_HOST_SYNC2;
-    arb_host_put_u16(&frame[2], id);
+    pdcp_bytes_put_u16(&frame[2], id);
     frame[4] = reference;
-    arb_host_put_u16(&frame[6], size);
+    pdcp_bytes_put_u16(&frame[6], size);
     frame[5] = arb_host_crc8(frame);
     if (len != 0) {
-        arb_host_put_u16(&frame[ARB_HOST_HEADER + len], arb_host_crc16(&frame[ARB_HOST_HEADER], len));
+        pdcp_bytes_put_u16(&frame[ARB_HOST_HEADER + len], arb_host_crc16(&frame[ARB_HOST_HEADER], len));
     }
     return (uint16_t)(ARB_HOST_HEADER + size);
 }
 
-pdcp_identity_t arb_host_get_identity(const uint8_t bytes[6])
-{
-    const pdcp_identity_t identity = {.vid = arb_host_get_u16(&bytes[0]),
-                                      .pid = arb_host_get_u16(&bytes[2]),
-                                      .sn = arb_host_get_u16(&bytes[4])};
-    return identity;
-}
-
-void arb_host_put_identity(uint8_t bytes[6], const pdcp_identity_t *identity)
-{
-    arb_host_put_u16(&bytes[0], identity->vid);
-    arb_host_put_u16(&bytes[2], identity->pid);
-    arb_host_put_u16(&bytes[4], identity->sn);
-}
-
 void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index)
 {
-    arb_host_put_identity(bytes, identity);
+    pdcp_bytes_put_identity(bytes, identity);
     bytes[6] = index;
 }
 

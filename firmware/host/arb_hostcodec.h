@@ -1,5 +1,5 @@
-/* Wire layout of the host API [API 3.1]: header, checksums, and the fields that messages are made of. Nobody
- * else shifts bytes of a host message.
+/* Wire layout of the host API [API 3.1]: header, checksums, and the fields that messages are made of beside
+ * those of pdcp_bytes.h.
  *
  *   byte     0    1    2       3       4    5     6         7         8 ...    last two
  *            FEh  19h  id LSB  id MSB  ref  CRC8  size LSB  size MSB  payload  CRC16 LSB, MSB
@@ -49,26 +49,6 @@ enum {
     ARB_MSG_EVENT = 0x2419 /* from the arbitrator, unasked */
 };
 
-/* Error codes of failure answers (D-API-4). */
-enum {
-    ARB_OK = 0,
-    ARB_ERR_SIZE = 0x01,
-    ARB_ERR_NUMBER = 0x02,
-    ARB_ERR_DEVICE = 0x03,
-    ARB_ERR_CHANNEL = 0x04,
-    ARB_ERR_NO_ANSWER = 0x05,
-    ARB_ERR_REFUSED = 0x06,
-    ARB_ERR_BUSY = 0x07,
-    ARB_ERR_SOLE_ACCESS = 0x08,
-    ARB_ERR_NO_NODE_ID = 0x09,
-    ARB_ERR_BULK = 0x0A,
-    ARB_ERR_NOT_READY = 0x0B,
-    ARB_ERR_CRC = 0x0C,
-    ARB_ERR_STORAGE = 0x0D,
-    ARB_ERR_NOT_SUPPORTED = 0x0E,
-    ARB_ERR_VALUE = 0x0F
-};
-
 /* A message on its way to the host. */
 typedef struct {
     uint16_t len; /* of the whole message; 0: there is none */
@@ -85,12 +65,7 @@ uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len);
  * Returns the length of the whole message. frame[] needs room for header, payload and CRC16. */
 uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len);
 
-/* Fields, LSB first. */
-uint16_t arb_host_get_u16(const uint8_t *bytes);
-pdcp_identity_t arb_host_get_identity(const uint8_t bytes[6]); /* VID, PID, SN */
-void arb_host_put_u16(uint8_t *bytes, uint16_t value);
-void arb_host_put_u32(uint8_t *bytes, uint32_t value);
-void arb_host_put_identity(uint8_t bytes[6], const pdcp_identity_t *identity);
+/* A channel as messages name it: the identity of its device, its index. */
 void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
 
 /* The link of an input as 220Eh and its event tell of it: output, input, status. */

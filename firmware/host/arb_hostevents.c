@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bytes.h"
+
 /* In the queue an event is its length, then what the message holds: kind, time, data. */
 
 /* Puts the beginning of an event into the queue. Returns where its len bytes of data go; NULL: it is not
@@ -20,7 +22,7 @@ static uint8_t *put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t 
     }
     bytes[0] = (uint8_t)(ARB_EVENT_HEAD + len);
     bytes[1] = (uint8_t)kind;
-    arb_host_put_u32(&bytes[2], now_ms);
+    pdcp_bytes_put_u32(&bytes[2], now_ms);
     events->used = (uint8_t)(events->used + 1 + bytes[0]);
     return &bytes[1 + ARB_EVENT_HEAD];
 }
@@ -121,7 +123,7 @@ void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const ca
     }
     uint8_t *data = put(events, now_ms, ARB_EVENT_FRAME, (uint8_t)(3 + frame->dlc));
     if (data != NULL) {
-        arb_host_put_u16(&data[0], frame->id);
+        pdcp_bytes_put_u16(&data[0], frame->id);
         data[2] = frame->dlc;
         memcpy(&data[3], frame->data, frame->dlc);
     }

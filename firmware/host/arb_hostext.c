@@ -2,8 +2,10 @@
 
 #include <string.h>
 
+#include "arb_error.h"
 #include "arb_hostcall.h"
 #include "arb_version.h"
+#include "pdcp_bytes.h"
 #include "profile_channel.h"
 
 /* 2401h */
@@ -49,7 +51,7 @@ uint8_t arb_hostext_action(arb_call_t *call)
         if (!arb_limb_take_outcome(limb, &error, &result)) {
             return arb_call_wait(call, ARB_HOST_ANSWER_MS) ? ARB_PENDING : ARB_ERR_BUSY;
         }
-        arb_host_put_u16(call->answer, result);
+        pdcp_bytes_put_u16(call->answer, result);
         call->answer_len = 2;
         return error;
     }
@@ -76,7 +78,7 @@ uint8_t arb_hostext_read_configs(arb_call_t *call)
 {
     arb_turn_t *turn = &call->api->turn;
     arb_config_t *config = &call->env->limb->config;
-    const uint16_t offset = arb_host_get_u16(&call->payload[0]);
+    const uint16_t offset = pdcp_bytes_get_u16(&call->payload[0]);
     const uint8_t len = call->payload[2];
     uint8_t piece = (uint8_t)(len - turn->value_len);
     if (len > ARB_CONFIG_RAW_MAX) {
@@ -97,8 +99,8 @@ uint8_t arb_hostext_read_configs(arb_call_t *call)
         turn->until_ms = call->now_ms; /* called again with the next step, which is due at once */
         return ARB_PENDING;
     }
-    arb_host_put_u16(&call->answer[0], arb_config_length(config));
-    arb_host_put_u16(&call->answer[2], offset);
+    pdcp_bytes_put_u16(&call->answer[0], arb_config_length(config));
+    pdcp_bytes_put_u16(&call->answer[2], offset);
     call->answer_len = (uint16_t)(4 + turn->value_len);
     return ARB_OK;
 }
@@ -109,8 +111,8 @@ uint8_t arb_hostext_write_configs(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
     arb_config_t *config = &limb->config;
-    const uint16_t offset = arb_host_get_u16(&call->payload[0]);
-    const uint16_t total = arb_host_get_u16(&call->payload[2]);
+    const uint16_t offset = pdcp_bytes_get_u16(&call->payload[0]);
+    const uint16_t total = pdcp_bytes_get_u16(&call->payload[2]);
     const uint16_t len = (uint16_t)(call->len - 4);
     if (!call->api->turn.started) {
         const arb_config_status_t status =
@@ -151,7 +153,7 @@ uint8_t arb_hostext_remove_link(arb_call_t *call)
 
 static void put_counter(arb_call_t *call, uint32_t value)
 {
-    arb_host_put_u32(&call->answer[call->answer_len], value);
+    pdcp_bytes_put_u32(&call->answer[call->answer_len], value);
     call->answer_len = (uint16_t)(call->answer_len + 4);
 }
 
@@ -214,7 +216,7 @@ uint8_t arb_hostext_event_stream(arb_call_t *call)
     if (call->len > 2) {
         return ARB_ERR_SIZE;
     }
-    const uint16_t mask = call->len == 2 ? arb_host_get_u16(call->payload) : call->payload[0];
+    const uint16_t mask = call->len == 2 ? pdcp_bytes_get_u16(call->payload) : call->payload[0];
     if ((mask & ~ARB_EVENT_MASK) != 0) {
         return ARB_ERR_VALUE;
     }

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pdcp_bytes.h"
 #include "pdcp_time.h"
 
 static void count(arb_hostrx_t *rx, arb_hostrx_counter_t counter)
@@ -54,7 +55,7 @@ static bool crc8_matches(const uint8_t *header)
 /* Bytes of the message at the front, as its header says. */
 static uint16_t front_total(const arb_hostrx_t *rx)
 {
-    return (uint16_t)(ARB_HOST_HEADER + arb_host_get_u16(&rx->bytes[6]));
+    return (uint16_t)(ARB_HOST_HEADER + pdcp_bytes_get_u16(&rx->bytes[6]));
 }
 
 void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms)
@@ -88,7 +89,7 @@ static front_t look_inside(const arb_hostrx_t *rx, uint16_t total)
 
 static bool crc16_matches(const uint8_t *payload, uint16_t len)
 {
-    return len == 0 || arb_host_get_u16(&payload[len]) == arb_host_crc16(payload, len);
+    return len == 0 || pdcp_bytes_get_u16(&payload[len]) == arb_host_crc16(payload, len);
 }
 
 /* All of the message at the front is here. */
@@ -113,8 +114,8 @@ static front_t look_at_front(arb_hostrx_t *rx, arb_hostrx_request_t *request)
     if (rx->len < ARB_HOST_HEADER) {
         return FRONT_OPEN;
     }
-    const uint16_t size = arb_host_get_u16(&bytes[6]);
-    request->id = arb_host_get_u16(&bytes[2]);
+    const uint16_t size = pdcp_bytes_get_u16(&bytes[6]);
+    request->id = pdcp_bytes_get_u16(&bytes[2]);
     request->reference = bytes[4];
     request->len = 0;
     request->error = ARB_OK;

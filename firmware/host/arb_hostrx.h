@@ -11,6 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "arb_error.h"
 #include "arb_hostcodec.h"
 
 /* Silence inside a message after which it is given up (D-API-2). */

@@ -1,7 +1,7 @@
 #include "arb_area.h"
 
 #include "arb_crc.h"
-#include "arb_hostcodec.h"
+#include "pdcp_bytes.h"
 
 arb_area_state_t arb_area_open(const arb_nvm_t *nvm, uint16_t address, uint8_t letter, uint8_t *header,
                                uint16_t size)
@@ -15,7 +15,7 @@ arb_area_state_t arb_area_open(const arb_nvm_t *nvm, uint16_t address, uint8_t l
 
 bool arb_area_offer(arb_area_t *newest, uint8_t area, const uint8_t header[ARB_AREA_HEADER])
 {
-    const uint16_t sequence = arb_host_get_u16(&header[4]);
+    const uint16_t sequence = pdcp_bytes_get_u16(&header[4]);
     if (newest->area != (uint8_t)ARB_AREAS && (int16_t)(uint16_t)(sequence - newest->sequence) <= 0) {
         return false;
     }
@@ -31,7 +31,7 @@ void arb_area_put_header(const arb_area_t *newest, uint8_t letter, uint8_t count
     header[1] = letter;
     header[2] = ARB_AREA_VERSION;
     header[3] = count;
-    arb_host_put_u16(&header[4], (uint16_t)(newest->sequence + 1));
+    pdcp_bytes_put_u16(&header[4], (uint16_t)(newest->sequence + 1));
 }
 
 /* Records ------------------------------------------------------------------------------------------------ */
@@ -109,7 +109,7 @@ static uint16_t put_page(const arb_record_t *record, const arb_area_t *newest, u
             record->put(table, k, bytes);
             len = record->entry;
         } else {
-            arb_host_put_u32(bytes, ~copy->crc);
+            pdcp_bytes_put_u32(bytes, ~copy->crc);
             len = ARB_AREA_CRC;
         }
     }

@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "arb_crc.h"
-#include "arb_hostcodec.h"
+#include "pdcp_bytes.h"
 #include "pdcp_time.h"
 
 #define CONFIG_NOWHERE 0x8000u /* an offset far behind every string */
@@ -104,7 +104,7 @@ static bool read_area(arb_config_t *config, const arb_nvm_t *nvm, uint8_t area,
                       const uint8_t header[ARB_CONFIG_HEADER])
 {
     uint8_t bytes[CONFIG_CHUNK];
-    open_string(config, area, arb_host_get_u16(&header[6]), NULL);
+    open_string(config, area, pdcp_bytes_get_u16(&header[6]), NULL);
     if (config->until > ARB_CONFIG_STRING_MAX) {
         return false;
     }
@@ -480,8 +480,8 @@ static arb_config_status_t step_header(arb_config_t *config, const arb_nvm_t *nv
 {
     uint8_t header[ARB_CONFIG_HEADER];
     arb_area_put_header(&config->newest, 'C', 0, header);
-    arb_host_put_u16(&header[6], config->until);
-    arb_host_put_u32(&header[CONFIG_MEMBERS], ~arb_crc32(config->crc_read, header, CONFIG_MEMBERS));
+    pdcp_bytes_put_u16(&header[6], config->until);
+    pdcp_bytes_put_u32(&header[CONFIG_MEMBERS], ~arb_crc32(config->crc_read, header, CONFIG_MEMBERS));
     config->phase = PHASE_ADOPT;
     return write_page(config, nvm, header_address(config->from), header, sizeof header);
 }

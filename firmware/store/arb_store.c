@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "arb_hostcodec.h"
+#include "pdcp_bytes.h"
 
 /* A larger table needs another layout: a negative array size does not compile. */
 typedef char arb_store_fits_its_place[ARB_AREAS * ARB_STORE_AREA <= ARB_NVM_FLAGS_AT ? 1 : -1];
@@ -10,14 +10,14 @@ typedef char arb_store_fits_its_place[ARB_AREAS * ARB_STORE_AREA <= ARB_NVM_FLAG
 static void put_entry(const void *table, uint8_t k, uint8_t *entry)
 {
     const pdcp_remembered_t *remembered = &((const pdcp_bind_t *)table)->remembered[k];
-    arb_host_put_identity(entry, &remembered->identity);
+    pdcp_bytes_put_identity(entry, &remembered->identity);
     entry[6] = remembered->node_id;
 }
 
 static void take_entry(void *table, uint8_t k, const uint8_t *entry)
 {
     (void)k;
-    const pdcp_remembered_t remembered = {.identity = arb_host_get_identity(entry), .node_id = entry[6]};
+    const pdcp_remembered_t remembered = {.identity = pdcp_bytes_get_identity(entry), .node_id = entry[6]};
     (void)pdcp_bind_remember_stored(table, &remembered);
 }
 

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bytes.h"
 #include "pdcp_setup.h"
 #include "pdcp_time.h"
 
@@ -557,7 +558,7 @@ static void host_has_set(pdcp_arb_t *arb)
     const uint8_t *value = &host->bytes[head];
     const uint16_t len = (uint16_t)(host->size - head);
     if (host->channel == 0) {
-        pdcp_setup_take_time(node_of(arb, host->node), host->param, pdcp_value_u16(value, len, 0));
+        pdcp_setup_take_time(node_of(arb, host->node), host->param, pdcp_bytes_value_u16(value, len, 0));
         expect_life(arb, host->node);
         return;
     }
@@ -581,7 +582,7 @@ static void host_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *rep
         host_has_set(arb);
     } else if (success && (host->code == PDCP_SUSPEND || host->code == PDCP_RELEASE)) {
         pdcp_suspend_on_host(&arb->bus, node, host->code,
-                             raw ? pdcp_value_u16(host->bytes, host->size, 1) : host->size);
+                             raw ? pdcp_bytes_value_u16(host->bytes, host->size, 1) : host->size);
     }
     if (reply->len != 0 && (raw || (host->code == PDCP_GET_PARAMETER && end <= host->size))) {
         memcpy(&host->bytes[reply->offset], reply->bytes, reply->len);

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "pdcp_bus.h"
+#include "pdcp_bytes.h"
 
 enum {
     SPARE_EVERY = 4,                   /* of so many questions one is for a channel without a link */
@@ -201,7 +202,7 @@ void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
 static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
-    const uint8_t first = pdcp_value_u8(reply->bytes, reply->len, 0);
+    const uint8_t first = pdcp_bytes_value_u8(reply->bytes, reply->len, 0);
     if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
         return first == 0 || (is_output(channel) && channel->enabled); /* by the host, who reads it */
     }
@@ -214,10 +215,11 @@ static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
     if (bus->audit.asked_kind == PDCP_AUDIT_NODES) {
         const pdcp_channel_t *source = &bus->nodes.channels[channel->feed];
         return first == pdcp_bus_node(bus, source->node)->node_id &&
-               pdcp_value_u8(reply->bytes, reply->len, 1) == source->node_id;
+               pdcp_bytes_value_u8(reply->bytes, reply->len, 1) == source->node_id;
     }
-    return channel->link != PDCP_LINK_NONE ? pdcp_nodes_is_source(channel, reply)
-                                           : !pdcp_nodes_is_named(pdcp_value_u8(reply->bytes, reply->len, 2));
+    return channel->link != PDCP_LINK_NONE
+               ? pdcp_nodes_is_source(channel, reply)
+               : !pdcp_nodes_is_named(pdcp_bytes_value_u8(reply->bytes, reply->len, 2));
 }
 
 /* Counts a difference. Returns how many of its kind there are in the minute under way, which begins with the
@@ -287,6 +289,6 @@ void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
         on_difference(bus, number);
     } else if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
         /* What was to be disabled may have refused that before. */
-        bus->nodes.channels[number].enabled = pdcp_value_u8(reply->bytes, reply->len, 0) != 0;
+        bus->nodes.channels[number].enabled = pdcp_bytes_value_u8(reply->bytes, reply->len, 0) != 0;
     }
 }

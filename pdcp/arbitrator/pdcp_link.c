@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "pdcp_bus.h"
+#include "pdcp_bytes.h"
 
 /* Steps of a job in the order of making a link; undoing and removing run through them backwards. */
 typedef enum {
@@ -559,8 +560,8 @@ static uint8_t value_of(pdcp_bus_t *bus, uint8_t *param, uint8_t *bytes)
         len = bus->link.step == STEP_OUTPUT_ON && bus->link.output_was_on ? 0 : 1;
         break;
     }
-    pdcp_put_u16(&bytes[0], low);
-    pdcp_put_u16(&bytes[2], high);
+    pdcp_bytes_put_u16(&bytes[0], low);
+    pdcp_bytes_put_u16(&bytes[2], high);
     return len;
 }
 

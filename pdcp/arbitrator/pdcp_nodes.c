@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pdcp_bytes.h"
 #include "pdcp_codec.h"
 
 /* Makes a place free. */
@@ -157,8 +158,8 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
 
 void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
 {
-    const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
-    const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
+    const uint16_t low = pdcp_bytes_value_u16(reply->bytes, reply->len, 0);
+    const uint16_t high = pdcp_bytes_value_u16(reply->bytes, reply->len, 2);
     if (reply->param == PDCP_IN_SOURCE_VID_PID) {
         input->source.vid = low;
         input->source.pid = high;
@@ -173,8 +174,8 @@ void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
 
 bool pdcp_nodes_is_source(const pdcp_channel_t *input, const pdcp_reply_t *reply)
 {
-    const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
-    const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
+    const uint16_t low = pdcp_bytes_value_u16(reply->bytes, reply->len, 0);
+    const uint16_t high = pdcp_bytes_value_u16(reply->bytes, reply->len, 2);
     if (reply->param == PDCP_IN_SOURCE_VID_PID) {
         return input->source.vid == low && input->source.pid == high;
     }

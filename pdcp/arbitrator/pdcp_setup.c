@@ -2,6 +2,8 @@
 
 #include <stddef.h>
 
+#include "pdcp_bytes.h"
+
 typedef enum { PASS_DEVICE, PASS_SILENCE, PASS_DIRECTION, PASS_CHANNELS } pass_t;
 
 /* A parameter, and what is to be done with it; 0 ends a list. */
@@ -300,8 +302,8 @@ static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply
     if (reply->offset != 0) {
         return true;
     }
-    const uint16_t low = pdcp_value_u16(reply->bytes, reply->len, 0);
-    const uint16_t high = pdcp_value_u16(reply->bytes, reply->len, 2);
+    const uint16_t low = pdcp_bytes_value_u16(reply->bytes, reply->len, 0);
+    const uint16_t high = pdcp_bytes_value_u16(reply->bytes, reply->len, 2);
     return device->setup_pass == PASS_DEVICE ? take_device(bus, device, reply->param, low, high)
                                              : take_channel(bus, device->setup_channel, reply, low, high);
 }

@@ -3,6 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bytes.h"
+
 /* Fields of a message, in the order in which they stand behind the function code. */
 enum {
     RESULT = 0x01,   /* 1 byte */
@@ -63,11 +65,6 @@ static const layout_t *layout_of(uint8_t code)
     return (code & 0x70u) == 0 && layouts[row].dlcs != 0 ? &layouts[row] : NULL;
 }
 
-static uint16_t get_u16(const uint8_t *bytes)
-{
-    return (uint16_t)(bytes[0] | (uint16_t)((uint16_t)bytes[1] << 8));
-}
-
 /* Takes the fields out of the data behind the function code. */
 static void take_fields(uint8_t fields, const uint8_t *at, const uint8_t *end, pdcp_msg_t *msg)
 {
@@ -87,12 +84,10 @@ static void take_fields(uint8_t fields, const uint8_t *at, const uint8_t *end, p
         msg->channel = *at++;
     }
     if ((fields & WORD) != 0) {
-        msg->word = get_u16(at);
+        msg->word = pdcp_bytes_get_u16(at);
     }
     if ((fields & IDENTITY) != 0) {
-        msg->identity.vid = get_u16(at);
-        msg->identity.pid = get_u16(at + 2);
-        msg->identity.sn = get_u16(at + 4);
+        msg->identity = pdcp_bytes_get_identity(at);
     }
     if ((fields & VALUE) != 0) {
         msg->len = (uint8_t)(end - at);
@@ -141,14 +136,12 @@ static uint8_t *put_fields(uint8_t fields, const pdcp_msg_t *msg, uint8_t *at)
         *at++ = msg->channel;
     }
     if ((fields & WORD) != 0) {
-        pdcp_put_u16(at, msg->word);
+        pdcp_bytes_put_u16(at, msg->word);
         at += 2;
     }
     if ((fields & IDENTITY) != 0) {
-        pdcp_put_u16(at, msg->identity.vid);
-        pdcp_put_u16(at + 2, msg->identity.pid);
-        pdcp_put_u16(at + 4, msg->identity.sn);
-        at += 6;
+        pdcp_bytes_put_identity(at, &msg->identity);
+        at += PDCP_BYTES_IDENTITY;
     }
     if ((fields & VALUE) != 0) {
         memcpy(at, msg->value, msg->len);
@@ -163,22 +156,6 @@ void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame)
     frame->id = can_id;
     frame->data[0] = msg->code;
     frame->dlc = (uint8_t)(put_fields(layout_of(msg->code)->fields, msg, &frame->data[1]) - frame->data);
-}
-
-uint8_t pdcp_value_u8(const uint8_t *value, uint16_t len, uint16_t at)
-{
-    return at < len ? value[at] : 0;
-}
-
-uint16_t pdcp_value_u16(const uint8_t *value, uint16_t len, uint16_t at)
-{
-    return at + 1u < len ? get_u16(&value[at]) : pdcp_value_u8(value, len, at);
-}
-
-void pdcp_put_u16(uint8_t *bytes, uint16_t word)
-{
-    bytes[0] = (uint8_t)(word & 0xFFu);
-    bytes[1] = (uint8_t)(word >> 8);
 }
 
 bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b)

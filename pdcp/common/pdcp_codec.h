@@ -1,6 +1,6 @@
 /* Wire layout of identifiers and of CAN data [PDCP 2.2, 3.2]. Nobody else shifts bytes of a CAN frame.
  *
- * Pure functions; multi-byte fields are little-endian (D-BUS-1). */
+ * Pure functions. Fields of several bytes are pdcp_bytes.h's. */
 #ifndef PDCP_CODEC_H
 #define PDCP_CODEC_H
 
@@ -59,13 +59,6 @@ pdcp_decode_t pdcp_decode(const can_frame_t *frame, pdcp_msg_t *msg);
 /* Builds the frame of a message, with the sizes of [PDCP 3.2]. msg->code must be one of the codes above,
  * msg->len at most what the code's value field holds. */
 void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame);
-
-/* Little-endian fields of parameter values. A value may be shorter or longer than its field: missing bytes
- * are 0, extra ones are ignored (pdcp-bus.md 4). len is the number of bytes there are, at is where the field
- * begins. */
-uint8_t pdcp_value_u8(const uint8_t *value, uint16_t len, uint16_t at);
-uint16_t pdcp_value_u16(const uint8_t *value, uint16_t len, uint16_t at);
-void pdcp_put_u16(uint8_t *bytes, uint16_t word);
 
 bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b);
 

@@ -2,6 +2,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_bytes.h"
 #include "pdcp_device_parts.h"
 
 /* --- reading --- */
@@ -15,15 +16,15 @@ static void value_u8(pdcp_device_value_t *value, uint8_t byte)
 
 static void value_u16(pdcp_device_value_t *value, uint16_t word)
 {
-    pdcp_put_u16(value->small, word);
+    pdcp_bytes_put_u16(value->small, word);
     value->bytes = value->small;
     value->len = 2;
 }
 
 static void value_words(pdcp_device_value_t *value, uint16_t first, uint16_t second)
 {
-    pdcp_put_u16(&value->small[0], first);
-    pdcp_put_u16(&value->small[2], second);
+    pdcp_bytes_put_u16(&value->small[0], first);
+    pdcp_bytes_put_u16(&value->small[2], second);
     value->bytes = value->small;
     value->len = 4;
 }
@@ -195,7 +196,7 @@ static bool set_word_within(uint16_t *word, uint16_t now, uint16_t min, uint16_t
 
 static bool set_device(pdcp_device_t *dev, uint8_t param, const uint8_t *bytes, uint8_t len)
 {
-    const uint16_t word = pdcp_value_u16(bytes, len, 0);
+    const uint16_t word = pdcp_bytes_value_u16(bytes, len, 0);
     switch (param) {
     case PDCP_DEV_BEACON_INTERVAL:
         return set_word_within(&dev->beacon_ms, word, PDCP_BEACON_MIN_MS, PDCP_BEACON_MAX_MS);
@@ -225,16 +226,16 @@ static bool set_source(pdcp_device_t *dev, uint8_t param, uint8_t channel, const
     const pdcp_device_source_t before = *source;
     switch (param) {
     case PDCP_IN_SOURCE_VID_PID:
-        source->identity.vid = pdcp_value_u16(bytes, len, 0);
-        source->identity.pid = pdcp_value_u16(bytes, len, 2);
+        source->identity.vid = pdcp_bytes_value_u16(bytes, len, 0);
+        source->identity.pid = pdcp_bytes_value_u16(bytes, len, 2);
         break;
     case PDCP_IN_SOURCE_SERIAL:
-        source->identity.sn = pdcp_value_u16(bytes, len, 0);
-        source->channel = pdcp_value_u8(bytes, len, 2);
+        source->identity.sn = pdcp_bytes_value_u16(bytes, len, 0);
+        source->channel = pdcp_bytes_value_u8(bytes, len, 2);
         break;
     case PDCP_IN_SOURCE_TYPE:
-        source->type = pdcp_value_u16(bytes, len, 0);
-        source->profile = pdcp_value_u16(bytes, len, 2);
+        source->type = pdcp_bytes_value_u16(bytes, len, 0);
+        source->profile = pdcp_bytes_value_u16(bytes, len, 2);
         break;
     default:
         return false;
@@ -253,8 +254,8 @@ static bool set_source(pdcp_device_t *dev, uint8_t param, uint8_t channel, const
 
 static bool set_source_nodes(pdcp_device_t *dev, uint8_t channel, const uint8_t *bytes, uint8_t len)
 {
-    const uint8_t device = pdcp_value_u8(bytes, len, 0);
-    const uint8_t output = pdcp_value_u8(bytes, len, 1);
+    const uint8_t device = pdcp_bytes_value_u8(bytes, len, 0);
+    const uint8_t output = pdcp_bytes_value_u8(bytes, len, 1);
     if (device > PDCP_NODE_MAX || output > PDCP_NODE_MAX) {
         return false;
     }
@@ -267,15 +268,15 @@ static bool set_source_nodes(pdcp_device_t *dev, uint8_t channel, const uint8_t 
 static bool set_channel(pdcp_device_t *dev, uint8_t param, uint8_t channel, const uint8_t *bytes, uint8_t len)
 {
     if (param == PDCP_CH_ENABLED) {
-        set_enabled(dev, channel, pdcp_value_u8(bytes, len, 0) != 0);
+        set_enabled(dev, channel, pdcp_bytes_value_u8(bytes, len, 0) != 0);
         return true;
     }
     if (dev->desc->channels[channel - 1].direction == PDCP_INPUT) {
         return param == PDCP_IN_SOURCE_NODES ? set_source_nodes(dev, channel, bytes, len)
                                              : set_source(dev, param, channel, bytes, len);
     }
-    if (param == PDCP_OUT_NODE_ID && pdcp_value_u8(bytes, len, 0) <= PDCP_NODE_MAX) {
-        dev->channels[channel - 1].node_id = pdcp_value_u8(bytes, len, 0);
+    if (param == PDCP_OUT_NODE_ID && pdcp_bytes_value_u8(bytes, len, 0) <= PDCP_NODE_MAX) {
+        dev->channels[channel - 1].node_id = pdcp_bytes_value_u8(bytes, len, 0);
         return true;
     }
     return false;

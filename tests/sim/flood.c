@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "arb_hostcodec.h"
+#include "pdcp_bytes.h"
 #include "unity.h"
 
 enum {
@@ -253,10 +254,10 @@ static void read_links(flood_t *flood)
     size_t at = 0;
     while (at + ARB_HOST_HEADER <= limb->answer_len) {
         const uint8_t *message = &limb->answer[at];
-        if (arb_host_get_u16(&message[2]) == ARB_MSG_LINK_INFO + 1) {
+        if (pdcp_bytes_get_u16(&message[2]) == ARB_MSG_LINK_INFO + 1) {
             take_link(&message[ARB_HOST_HEADER], active);
         }
-        at += ARB_HOST_HEADER + arb_host_get_u16(&message[6]);
+        at += ARB_HOST_HEADER + pdcp_bytes_get_u16(&message[6]);
     }
     for (int i = 0; i < FLOOD_LINKS; i++) {
         if (active[i] && !flood->listed[i]) {

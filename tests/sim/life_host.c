@@ -5,6 +5,7 @@
 
 #include "arb_hostcodec.h"
 #include "life.h"
+#include "pdcp_bytes.h"
 #include "unity.h"
 
 enum {
@@ -44,7 +45,7 @@ static const pdcp_device_desc_t *put_device(life_host_t *host, const limb_t *lim
         part = &limb->parts[chance(host, (uint32_t)limb->count)];
     }
     const pdcp_device_desc_t *desc = &part->ini->desc;
-    arb_host_put_identity(bytes, &desc->identity);
+    pdcp_bytes_put_identity(bytes, &desc->identity);
     if (life_chance(&host->random, 4)) {
         bytes[4] ^= 0x80;
     }
@@ -110,14 +111,14 @@ static uint16_t ask_set(life_host_t *host, const limb_t *limb, uint8_t *payload)
     if (life_chance(&host->random, 30)) {
         payload[6] = (uint8_t)(1 + chance(host, (uint32_t)desc->channel_count + 1u));
         payload[7] = (uint8_t)(5 + chance(host, 4));
-        arb_host_put_u16(&payload[8], (uint16_t)(2 + chance(host, 3)));
-        arb_host_put_u16(&payload[10], (uint16_t)(1 + chance(host, 3)));
+        pdcp_bytes_put_u16(&payload[8], (uint16_t)(2 + chance(host, 3)));
+        pdcp_bytes_put_u16(&payload[10], (uint16_t)(1 + chance(host, 3)));
         return 12;
     }
     const unsigned k = chance(host, sizeof words / sizeof words[0]);
     payload[6] = 0;
     payload[7] = words[k].param;
-    arb_host_put_u16(&payload[8], (uint16_t)(words[k].low + chance(host, words[k].high - words[k].low)));
+    pdcp_bytes_put_u16(&payload[8], (uint16_t)(words[k].low + chance(host, words[k].high - words[k].low)));
     return 10;
 }
 
@@ -179,7 +180,7 @@ static uint16_t ask_action(life_host_t *host, const limb_t *limb, uint8_t *paylo
 static uint16_t ask_read(life_host_t *host, const limb_t *limb, uint8_t *payload)
 {
     (void)limb;
-    arb_host_put_u16(payload, (uint16_t)chance(host, 1200));
+    pdcp_bytes_put_u16(payload, (uint16_t)chance(host, 1200));
     payload[2] = (uint8_t)chance(host, 132);
     return 3;
 }
@@ -205,7 +206,7 @@ static uint16_t ask_stream(life_host_t *host, const limb_t *limb, uint8_t *paylo
     if (is_wide && life_chance(&host->random, 80)) {
         mask |= 0x100;
     }
-    arb_host_put_u16(payload, mask);
+    pdcp_bytes_put_u16(payload, mask);
     return is_wide ? 2 : 1;
 }
 
@@ -214,7 +215,7 @@ static uint16_t ask_stream(life_host_t *host, const limb_t *limb, uint8_t *paylo
 static void put_entry(life_host_t *host, uint8_t code, uint16_t value)
 {
     host->string[host->string_len] = code;
-    arb_host_put_u16(&host->string[host->string_len + 1], value);
+    pdcp_bytes_put_u16(&host->string[host->string_len + 1], value);
     host->string_len = (uint16_t)(host->string_len + 3);
 }
 
@@ -222,7 +223,7 @@ static void put_end(life_host_t *host, const limb_t *limb, uint8_t direction)
 {
     uint8_t bytes[7];
     put_channel(host, limb, bytes, direction);
-    const pdcp_identity_t owner = arb_host_get_identity(bytes);
+    const pdcp_identity_t owner = pdcp_bytes_get_identity(bytes);
     put_entry(host, direction == PDCP_INPUT ? 5 : 6, 0);
     put_entry(host, 7, (uint16_t)(life_chance(&host->random, 50) ? 0x5200 : 0x5000));
     put_entry(host, 8, (uint16_t)((1 + chance(host, 2)) << 12 | (1 + chance(host, 2)) << 8));
@@ -306,8 +307,8 @@ static uint16_t ask_write(life_host_t *host, const limb_t *limb, uint8_t *payloa
     len = len < most ? len : most;
     const uint16_t offset = host->string_at;
     const bool astray = life_chance(&host->random, 5);
-    arb_host_put_u16(&payload[0], (uint16_t)(offset + (astray ? 7 : 0)));
-    arb_host_put_u16(&payload[2], host->string_len);
+    pdcp_bytes_put_u16(&payload[0], (uint16_t)(offset + (astray ? 7 : 0)));
+    pdcp_bytes_put_u16(&payload[2], host->string_len);
     memcpy(&payload[4], &host->string[offset], len);
     host->string_at = astray ? 0 : (uint16_t)(offset + len);
     return (uint16_t)(4 + len);
@@ -409,7 +410,7 @@ void life_host_ask(life_host_t *host, const limb_t *limb)
         request->last_piece = false;
         host->string_at = 0;
     }
-    request->mask = request->len == 2 ? arb_host_get_u16(payload) : payload[0];
+    request->mask = request->len == 2 ? pdcp_bytes_get_u16(payload) : payload[0];
     request->reference = next_reference(host);
     request->may_be_lost = host->garbage_end == host->put_bytes;
     const uint16_t total = arb_host_finish(bytes, request->id, request->reference, request->len);
@@ -681,7 +682,7 @@ static uint32_t take_message(life_host_t *host, uint32_t now_ms)
     if (host->in_len < ARB_HOST_HEADER) {
         return 0;
     }
-    const uint16_t size = arb_host_get_u16(&host->in[6]);
+    const uint16_t size = pdcp_bytes_get_u16(&host->in[6]);
     if (host->in[5] != arb_host_crc8(host->in)) {
         TEST_ASSERT_TRUE_MESSAGE(host->stale, "CRC8 of an answer");
         return 1;
@@ -692,10 +693,10 @@ static uint32_t take_message(life_host_t *host, uint32_t now_ms)
     const uint16_t len = (uint16_t)(size != 0 ? size - ARB_HOST_CRC : 0);
     const uint8_t *payload = &host->in[ARB_HOST_HEADER];
     if (size != 0) {
-        TEST_ASSERT_EQUAL_HEX16_MESSAGE(arb_host_crc16(payload, len), arb_host_get_u16(&payload[len]),
+        TEST_ASSERT_EQUAL_HEX16_MESSAGE(arb_host_crc16(payload, len), pdcp_bytes_get_u16(&payload[len]),
                                         "CRC16");
     }
-    on_message(host, now_ms, arb_host_get_u16(&host->in[2]), host->in[4], payload, len);
+    on_message(host, now_ms, pdcp_bytes_get_u16(&host->in[2]), host->in[4], payload, len);
     return ARB_HOST_HEADER + (uint32_t)size;
 }
 

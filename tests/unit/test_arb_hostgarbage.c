@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "hostlink.h"
+#include "pdcp_bytes.h"
 #include "unity.h"
 
 #ifdef __AVR__
@@ -135,7 +136,7 @@ static void random_messages(bool strict)
         }
         uint16_t total = arb_host_finish(bytes, id, (uint8_t)n, len);
         if (chance(4) == 0) {
-            arb_host_put_u16(&bytes[6], (uint16_t)chance(0x10000));
+            pdcp_bytes_put_u16(&bytes[6], (uint16_t)chance(0x10000));
         }
         if (chance(4) == 0) {
             total = (uint16_t)chance(total + 1u); /* truncated */

@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "exchange.h"
+#include "pdcp_bytes.h"
 #include "unity.h"
 
 static exchange_t x;
@@ -551,11 +552,11 @@ static void answer(uint8_t number, uint8_t param)
         frame.data[4] = channel->node_id;
     } else if (param == 5) {
         frame.dlc = 8;
-        pdcp_put_u16(&frame.data[4], channel->source.vid);
-        pdcp_put_u16(&frame.data[6], channel->source.pid);
+        pdcp_bytes_put_u16(&frame.data[4], channel->source.vid);
+        pdcp_bytes_put_u16(&frame.data[6], channel->source.pid);
     } else if (param == 6) {
         frame.dlc = 7;
-        pdcp_put_u16(&frame.data[4], channel->source.sn);
+        pdcp_bytes_put_u16(&frame.data[4], channel->source.sn);
         frame.data[6] = channel->source_index;
     } else if (param == 7) {
         frame.dlc = 6;

@@ -2,6 +2,7 @@
  * the encoder. */
 #include <string.h>
 
+#include "pdcp_bytes.h"
 #include "pdcp_codec.h"
 #include "unity.h"
 
@@ -288,11 +289,11 @@ static void test_identifier_fields(void)
 static void test_values_shorter_and_longer_than_their_field(void)
 {
     const uint8_t value[] = {0x34, 0x12, 0x78};
-    TEST_ASSERT_EQUAL_HEX16(0x1234, pdcp_value_u16(value, 3, 0));
-    TEST_ASSERT_EQUAL_HEX16(0x0078, pdcp_value_u16(value, 3, 2));
-    TEST_ASSERT_EQUAL_HEX16(0x0034, pdcp_value_u16(value, 1, 0));
-    TEST_ASSERT_EQUAL_HEX16(0, pdcp_value_u16(value, 0, 0));
-    TEST_ASSERT_EQUAL_HEX8(0, pdcp_value_u8(value, 3, 3));
+    TEST_ASSERT_EQUAL_HEX16(0x1234, pdcp_bytes_value_u16(value, 3, 0));
+    TEST_ASSERT_EQUAL_HEX16(0x0078, pdcp_bytes_value_u16(value, 3, 2));
+    TEST_ASSERT_EQUAL_HEX16(0x0034, pdcp_bytes_value_u16(value, 1, 0));
+    TEST_ASSERT_EQUAL_HEX16(0, pdcp_bytes_value_u16(value, 0, 0));
+    TEST_ASSERT_EQUAL_HEX8(0, pdcp_bytes_value_u8(value, 3, 3));
 }
 
 int main(void)

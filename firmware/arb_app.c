@@ -32,6 +32,7 @@ static bool knows(void *ctx, const pdcp_identity_t *identity)
 void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *settings, uint32_t now_ms)
 {
     memset(app, 0, sizeof *app);
+    app->port = port;
     app->work = true;
     pdcp_arb_init(&app->arb, now_ms, settings->serial, settings->seed, on_event, app);
     pdcp_arb_know(&app->arb, knows);
@@ -56,7 +57,7 @@ void arb_app_on_frame(arb_app_t *app, uint32_t now_ms, const can_frame_t *frame)
         app->work = true;
     }
     if (arb_hostapi_wants_frames(&app->api)) {
-        arb_hostapi_on_frame(&app->api, app->nvm.port, now_ms, frame);
+        arb_hostapi_on_frame(&app->api, app->port, now_ms, frame);
         app->work = true;
     }
 }
@@ -89,9 +90,9 @@ uint16_t arb_app_on_bytes(arb_app_t *app, uint32_t now_ms, const uint8_t *bytes,
 static void send_frames(arb_app_t *app, uint32_t now_ms)
 {
     const can_frame_t *frame = pdcp_arb_tx_peek(&app->arb);
-    while (frame != NULL && app->nvm.port->can_send(app->nvm.port->ctx, frame)) {
+    while (frame != NULL && app->port->can_send(app->port->ctx, frame)) {
         if (arb_hostapi_wants_frames(&app->api)) {
-            arb_hostapi_on_frame(&app->api, app->nvm.port, now_ms, frame);
+            arb_hostapi_on_frame(&app->api, app->port, now_ms, frame);
         }
         pdcp_arb_tx_pop(&app->arb);
         frame = pdcp_arb_tx_peek(&app->arb);
@@ -103,7 +104,8 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
     if (!app->work && pdcp_time_before(now_ms, app->next_ms)) {
         return app->next_ms;
     }
-    const arb_hostenv_t env = {.arb = &app->arb, .limb = &app->limb, .nvm = &app->nvm, .store = &app->store};
+    const arb_hostenv_t env = {
+        .port = app->port, .arb = &app->arb, .limb = &app->limb, .nvm = &app->nvm, .store = &app->store};
     uint32_t next_ms;
     bool again;
     do {
@@ -113,8 +115,8 @@ uint32_t arb_app_step(arb_app_t *app, uint32_t now_ms)
             again = true;
         }
     } while (again);
-    if (pdcp_arb_take_restart(&app->arb) && app->nvm.port->can_restart != NULL) {
-        app->nvm.port->can_restart(app->nvm.port->ctx);
+    if (pdcp_arb_take_restart(&app->arb) && app->port->can_restart != NULL) {
+        app->port->can_restart(app->port->ctx);
     }
     send_frames(app, now_ms);
     arb_store_step(&app->store, &app->arb.bus.bind, now_ms);

@@ -29,8 +29,9 @@ typedef struct {
     uint32_t next_ms;        /* what arb_app_step returned last */
     arb_observer_t observer; /* NULL: nobody */
     void *observer_ctx;
-    bool work;     /* something was handed in, or frames or bytes wait for room */
-    arb_nvm_t nvm; /* and the port, of all else too */
+    const arb_port_t *port;
+    bool work; /* something was handed in, or frames or bytes wait for room */
+    arb_nvm_t nvm;
     arb_store_t store;
     arb_limb_t limb;
     arb_hostapi_t api;

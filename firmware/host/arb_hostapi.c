@@ -265,12 +265,12 @@ bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now
     }
     (void)accept_all(api);
     do {
-        flush(api, env->nvm->port);
+        flush(api, env->port);
     } while (api->held_count != 0 && !arb_hostapi_has_answer(api) && serve(api, env, now_ms));
     if (arb_limb_take_change(env->limb)) {
         arb_hostevents_on_config(&api->events, now_ms, env->limb->active, env->limb->config.stored);
     }
-    flush_events(api, env->nvm->port);
+    flush_events(api, env->port);
     return api->handed;
 }
 

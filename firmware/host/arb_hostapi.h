@@ -38,9 +38,10 @@ enum {
 
 /* What the API speaks to. */
 typedef struct {
+    const arb_port_t *port; /* takes the bytes for the host, and knows what drivers have counted */
     pdcp_arb_t *arb;
     arb_limb_t *limb;
-    arb_nvm_t *nvm; /* and its port */
+    arb_nvm_t *nvm;
     const arb_store_t *store;
 } arb_hostenv_t;
 

@@ -166,7 +166,7 @@ static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count
 
 static void put_driver_counters(arb_call_t *call)
 {
-    const arb_port_t *port = call->env->nvm->port;
+    const arb_port_t *port = call->env->port;
     for (uint8_t i = 0; i < (uint8_t)ARB_PORT_COUNTERS; i++) {
         put_counter(call, port->counter != NULL ? port->counter(port->ctx, (arb_port_counter_t)i) : 0);
     }

@@ -242,6 +242,7 @@ int main(int argc, char **argv)
         bench_bus_advance(&bench);
     }
     check(bench_bus_ready(&bench), "not every device is set up");
+    bench.app.port = &port;
     bench.app.nvm.port = &port;
     job_t job = {&bench.app, &bench.log, &sent, bench.now_us};
     (void)arb_app_step(job.app, now_ms(&job));

@@ -128,10 +128,10 @@ static bool takes(void *ctx, const can_frame_t *frame)
 
 static void test_frames_that_are_sent(void)
 {
-    arb_port_t sending = *app.nvm.port;
+    arb_port_t sending = *app.port;
     sending.can_send = takes;
     subscribe(0x10);
-    app.nvm.port = &sending;
+    app.port = &sending;
     exchange_wait(&x, 500);
     expect_event(BYTES(5, 0xF4, 0, 0, 0, 0, 1, 1, 0x0A));
     hostlink_silence();
@@ -272,7 +272,7 @@ static size_t writes_three(void *ctx, const uint8_t *bytes, size_t size)
 /* A driver that takes three bytes at a time, whatever it is offered. */
 static void test_no_message_is_torn_by_a_driver_that_takes_little(void)
 {
-    const arb_port_t *whole = app.nvm.port;
+    const arb_port_t *whole = app.port;
     arb_port_t little = *whole;
     const uint8_t *payload;
     uint16_t len;
@@ -280,7 +280,7 @@ static void test_no_message_is_torn_by_a_driver_that_takes_little(void)
     little.ctx = &whole;
     little.host_write = writes_three;
     subscribe(0x10);
-    app.nvm.port = &little;
+    app.port = &little;
     for (int i = 0; i < 200; i++) {
         exchange_rx(&x, "02A#0102030405060708");
         if (i % 20 == 0) {

@@ -535,9 +535,9 @@ static uint32_t driver_counter(void *ctx, arb_port_counter_t which)
 static void test_statistics_of_the_drivers(void) /* D-API-18 */
 {
     TEST_ASSERT_EQUAL_HEX32(0, counter(3, 0, 3));
-    arb_port_t counting = *app.nvm.port;
+    arb_port_t counting = *app.port;
     counting.counter = driver_counter;
-    app.nvm.port = &counting;
+    app.port = &counting;
     ask(0x2413, BYTES(3));
     expect(0x2414, BYTES(3, 4, 3, 2, 1, 5, 0, 0, 0, 6, 0, 0, 0));
     ask(0x2413, BYTES(4));

@@ -3,64 +3,18 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "pdcp_device_parts.h"
+#include "pdcp_codec.h"
+#include "pdcp_device_bind.h"
+#include "pdcp_device_bulk.h"
+#include "pdcp_device_param.h"
 #include "pdcp_time.h"
 
 enum {
-    ANSWER_ROOM = 4,        /* places of the queue that channel data leaves free */
-    SUGGESTIONS_MAX = 8,    /* in a row; then the retry timer decides, so that no quarrel fills the bus */
     UPDATE_RETRY_MS = 1000, /* D-BUS-19 */
     NO_ROOM_MS = 10         /* until a request that found the queue full is tried again */
 };
 
 /* --- sending --- */
-
-static bool put_frame(pdcp_device_t *dev, const can_frame_t *frame)
-{
-    const pdcp_txq_put_t put = pdcp_txq_put(&dev->txq, frame);
-    if (put != PDCP_TXQ_TAKEN) {
-        dev->stats.tx_full++;
-    }
-    return put != PDCP_TXQ_FULL;
-}
-
-/* The same frame waits already: a second one would say nothing new. */
-static bool is_waiting(const pdcp_device_t *dev, const can_frame_t *frame)
-{
-    for (uint8_t i = 0; i < dev->txq.count; i++) {
-        const can_frame_t *other = &dev->txq.frames[i];
-        if (other->id == frame->id && other->dlc == frame->dlc &&
-            memcmp(other->data, frame->data, frame->dlc) == 0) {
-            return true;
-        }
-    }
-    return false;
-}
-
-void pdcp_device_put(pdcp_device_t *dev, const pdcp_msg_t *msg)
-{
-    can_frame_t frame;
-    pdcp_encode(pdcp_can_id(PDCP_PRIORITY_NORMAL, false, dev->node_id), msg, &frame);
-    (void)put_frame(dev, &frame);
-}
-
-void pdcp_device_answer(pdcp_device_t *dev, const pdcp_msg_t *request, uint8_t result)
-{
-    pdcp_msg_t answer = *request;
-    answer.code = (uint8_t)(request->code | PDCP_ANSWER);
-    answer.result = result;
-    pdcp_device_put(dev, &answer);
-}
-
-static void put_beacon(pdcp_device_t *dev)
-{
-    const pdcp_msg_t beacon = {.code = PDCP_BEACON};
-    can_frame_t frame;
-    pdcp_encode(pdcp_can_id(PDCP_PRIORITY_HIGH, false, dev->node_id), &beacon, &frame);
-    if (!is_waiting(dev, &frame)) {
-        (void)put_frame(dev, &frame);
-    }
-}
 
 /* A full queue or a channel that may not send: the caller hears it, the bus does not. */
 static bool may_send(const pdcp_device_t *dev, uint32_t now_ms, uint8_t channel)
@@ -80,7 +34,7 @@ bool pdcp_device_send(pdcp_device_t *dev, uint32_t now_ms, uint8_t channel, cons
     if (!may_send(dev, now_ms, channel) || len > CAN_FRAME_DATA_MAX) {
         return false;
     }
-    if (dev->txq.count >= PDCP_TX_MAX - ANSWER_ROOM) {
+    if (!pdcp_device_tx_has_room(dev)) {
         dev->stats.tx_full++;
         return false;
     }
@@ -92,67 +46,10 @@ bool pdcp_device_send(pdcp_device_t *dev, uint32_t now_ms, uint8_t channel, cons
         memcpy(frame.data, data, len);
     }
     dev->stats.data_out++;
-    return put_frame(dev, &frame);
+    return pdcp_device_tx_frame(dev, &frame);
 }
 
-bool pdcp_device_tx_peek(const pdcp_device_t *dev, can_frame_t *frame)
-{
-    const can_frame_t *first = pdcp_txq_peek(&dev->txq);
-    if (first == NULL) {
-        return false;
-    }
-    *frame = *first;
-    return true;
-}
-
-void pdcp_device_tx_pop(pdcp_device_t *dev)
-{
-    if (dev->txq.count != 0) {
-        dev->stats.tx++;
-        pdcp_txq_pop(&dev->txq);
-    }
-}
-
-/* --- binding (pdcp-bus.md 3) --- */
-
-/* xorshift, never 0. */
-static uint32_t next_random(pdcp_device_t *dev)
-{
-    uint32_t x = dev->random;
-    x ^= x << 13;
-    x ^= x >> 17;
-    x ^= x << 5;
-    dev->random = x;
-    return x;
-}
-
-static bool is_node_id(uint8_t id)
-{
-    return id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX;
-}
-
-static void ask_for(pdcp_device_t *dev, uint32_t now_ms, uint8_t id)
-{
-    const pdcp_msg_t request = {.code = PDCP_BIND_DEVICE, .identity = dev->desc->identity};
-    can_frame_t frame;
-    dev->node_id = id;
-    pdcp_encode(pdcp_can_id(PDCP_PRIORITY_BINDING, false, id), &request, &frame);
-    if (put_frame(dev, &frame)) {
-        dev->stats.bind_requests++;
-    }
-    dev->bind_deadline_ms = now_ms + dev->bind_pause_ms + next_random(dev) % (dev->bind_pause_ms / 4 + 1);
-}
-
-/* Asks for the last id, or for a random one. */
-static void ask_again(pdcp_device_t *dev, uint32_t now_ms)
-{
-    const uint8_t random_id = (uint8_t)(PDCP_NODE_MIN + next_random(dev) % PDCP_NODE_MAX);
-    const uint32_t longest_ms =
-        dev->bind_ms > PDCP_DEVICE_BIND_MAX_MS ? dev->bind_ms : PDCP_DEVICE_BIND_MAX_MS;
-    dev->suggestions = 0;
-    ask_for(dev, now_ms, dev->record.node_id != 0 ? dev->record.node_id : random_id);
-    dev->bind_pause_ms = dev->bind_pause_ms * 2 < longest_ms ? dev->bind_pause_ms * 2 : longest_ms;
-}
+/* --- states --- */
 
 static void safe_inputs(pdcp_device_t *dev)
 {
@@ -166,12 +63,10 @@ static void safe_inputs(pdcp_device_t *dev)
 
 static void enter_asking(pdcp_device_t *dev, uint32_t now_ms)
 {
-    dev->node_id = 0; /* no id has been asked for yet */
     dev->suspended = false;
     dev->bulk.mode = PDCP_DEVICE_BULK_IDLE;
     pdcp_device_param_reset(dev);
-    dev->bind_pause_ms = dev->bind_ms;
-    dev->bind_deadline_ms = now_ms;
+    pdcp_device_bind_start(dev, now_ms);
 }
 
 static void enter_bound(pdcp_device_t *dev, uint32_t now_ms)
@@ -215,29 +110,6 @@ static void enter(pdcp_device_t *dev, pdcp_device_state_t state, uint32_t now_ms
     }
 }
 
-/* 81: the answer is ours only if identity and requested id are (D-BUS-6). */
-static void on_bind_answer(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
-{
-    if (!pdcp_identity_equal(&msg->identity, &dev->desc->identity)) {
-        dev->stats.drop_bind++;
-        return;
-    }
-    if (msg->node_id == dev->node_id) {
-        enter(dev, PDCP_DEVICE_BOUND, now_ms);
-    } else if (msg->node_id == PDCP_NODE_REFUSED) {
-        /* No answer is awaited any more: a grant would be for a twin with this identity (D-BUS-56). */
-        dev->node_id = 0;
-        dev->stats.bind_refused++;
-    } else if (!is_node_id(msg->node_id) || dev->suggestions >= SUGGESTIONS_MAX) {
-        dev->stats.drop_bind++;
-    } else {
-        dev->suggestions++;
-        dev->bind_pause_ms = dev->bind_ms;
-        pdcp_txq_init(&dev->txq);
-        ask_for(dev, now_ms, msg->node_id);
-    }
-}
-
 /* --- requests of the arbitrator --- */
 
 typedef void (*handler_t)(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg);
@@ -248,15 +120,15 @@ static void on_get(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
     pdcp_device_value_t value;
     pdcp_msg_t answer = *msg;
     if (!pdcp_device_param_get(dev, msg->param, msg->channel, &value)) {
-        pdcp_device_answer(dev, msg, PDCP_FAILURE);
+        pdcp_device_tx_answer(dev, msg, PDCP_FAILURE);
     } else if (value.len > PDCP_VALUE_MAX) {
-        pdcp_device_answer(dev, msg, PDCP_USE_BULK);
+        pdcp_device_tx_answer(dev, msg, PDCP_USE_BULK);
     } else {
         answer.len = (uint8_t)value.len;
         if (value.len != 0) {
             memcpy(answer.value, value.bytes, value.len);
         }
-        pdcp_device_answer(dev, &answer, PDCP_SUCCESS);
+        pdcp_device_tx_answer(dev, &answer, PDCP_SUCCESS);
     }
 }
 
@@ -264,7 +136,7 @@ static void on_set(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
 {
     (void)now_ms;
     const bool good = pdcp_device_param_set(dev, msg->param, msg->channel, msg->value, msg->len);
-    pdcp_device_answer(dev, msg, good ? PDCP_SUCCESS : PDCP_FAILURE);
+    pdcp_device_tx_answer(dev, msg, good ? PDCP_SUCCESS : PDCP_FAILURE);
 }
 
 static void on_suspend(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
@@ -291,7 +163,7 @@ static void on_beacon(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg
 static void on_reset(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
 {
     pdcp_txq_init(&dev->txq); /* nothing of the old life may follow the answer */
-    pdcp_device_answer(dev, msg, PDCP_SUCCESS);
+    pdcp_device_tx_answer(dev, msg, PDCP_SUCCESS);
     enter(dev, PDCP_DEVICE_ASKING, now_ms);
     safe_inputs(dev);
     if (dev->port->reset != NULL) {
@@ -358,7 +230,7 @@ static void dispatch(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg,
         }
         requests[i].handler(dev, now_ms, msg);
         if (requests[i].answered && !broadcast) {
-            pdcp_device_answer(dev, msg, PDCP_SUCCESS);
+            pdcp_device_tx_answer(dev, msg, PDCP_SUCCESS);
         }
         return;
     }
@@ -395,7 +267,9 @@ static void on_arbitrator(pdcp_device_t *dev, uint32_t now_ms, const can_frame_t
     if (dev->state != PDCP_DEVICE_ASKING) {
         dispatch(dev, now_ms, &msg, node == PDCP_NODE_BROADCAST);
     } else if (msg.code == (PDCP_BIND_DEVICE | PDCP_ANSWER) && node != PDCP_NODE_BROADCAST) {
-        on_bind_answer(dev, now_ms, &msg);
+        if (pdcp_device_bind_on_answer(dev, now_ms, &msg)) {
+            enter(dev, PDCP_DEVICE_BOUND, now_ms);
+        }
     } else {
         dev->stats.drop_unbound++;
     }
@@ -441,7 +315,7 @@ void pdcp_device_on_frame(pdcp_device_t *dev, uint32_t now_ms, const can_frame_t
 static uint32_t step_beacon(pdcp_device_t *dev, uint32_t now_ms)
 {
     if (pdcp_time_reached(now_ms, dev->beaconed_ms + dev->beacon_ms)) {
-        put_beacon(dev);
+        pdcp_device_tx_beacon(dev);
         dev->beaconed_ms += dev->beacon_ms;
         if (pdcp_time_reached(now_ms, dev->beaconed_ms + dev->beacon_ms)) {
             dev->beaconed_ms = now_ms; /* late by more than one: go on from here */
@@ -465,26 +339,15 @@ static uint32_t step_updates(pdcp_device_t *dev, uint32_t now_ms)
         }
         state->ask_due = state->ask_due || again;
         next_ms = pdcp_time_earlier(next_ms, dev->update_deadline_ms);
-        if (state->ask_due && dev->txq.count < PDCP_TX_MAX - ANSWER_ROOM) {
+        if (state->ask_due && pdcp_device_tx_has_room(dev)) {
             const pdcp_msg_t request = {.code = PDCP_UPDATE_CHANNEL, .channel = (uint8_t)(i + 1)};
-            pdcp_device_put(dev, &request);
+            pdcp_device_tx_msg(dev, &request);
             state->ask_due = false;
         } else if (state->ask_due) {
             next_ms = pdcp_time_earlier(next_ms, now_ms + NO_ROOM_MS);
         }
     }
     return next_ms;
-}
-
-static uint32_t step_asking(pdcp_device_t *dev, uint32_t now_ms)
-{
-    if (pdcp_time_reached(now_ms, dev->bind_deadline_ms)) {
-        if (dev->node_id != 0) {
-            pdcp_txq_init(&dev->txq); /* a request that still waits asks for an id that is no longer wanted */
-        }
-        ask_again(dev, now_ms);
-    }
-    return dev->bind_deadline_ms;
 }
 
 static uint32_t step_alone(pdcp_device_t *dev, uint32_t now_ms)
@@ -507,7 +370,7 @@ static uint32_t step_bound(pdcp_device_t *dev, uint32_t now_ms)
 uint32_t pdcp_device_step(pdcp_device_t *dev, uint32_t now_ms)
 {
     static uint32_t (*const steps[])(pdcp_device_t *, uint32_t) = {
-        [PDCP_DEVICE_ASKING] = step_asking,
+        [PDCP_DEVICE_ASKING] = pdcp_device_bind_step,
         [PDCP_DEVICE_BOUND] = step_bound,
         [PDCP_DEVICE_ALONE] = step_alone,
     };
@@ -519,7 +382,7 @@ uint32_t pdcp_device_step(pdcp_device_t *dev, uint32_t now_ms)
                                                       : next_ms;
 }
 
-/* --- the whole --- */
+/* --- start and readers --- */
 
 static void unconnect(pdcp_device_source_t *source)
 {
@@ -528,12 +391,6 @@ static void unconnect(pdcp_device_source_t *source)
     source->identity.pid = PDCP_NO_SOURCE_WORD;
     source->identity.sn = PDCP_NO_SOURCE_WORD;
     source->channel = PDCP_NO_SOURCE_INDEX;
-}
-
-bool pdcp_device_source_connected(const pdcp_device_source_t *source)
-{
-    return source->identity.vid != PDCP_NO_SOURCE_WORD || source->identity.pid != PDCP_NO_SOURCE_WORD ||
-           source->identity.sn != PDCP_NO_SOURCE_WORD || source->channel != PDCP_NO_SOURCE_INDEX;
 }
 
 uint8_t pdcp_device_listens_to(const pdcp_device_t *dev, uint8_t *ids, uint8_t max)
@@ -560,16 +417,6 @@ static bool usable(const pdcp_device_desc_t *desc)
     return true;
 }
 
-static uint32_t mixed_seed(const pdcp_identity_t *identity, uint32_t seed)
-{
-    uint32_t x = seed ^ 0x9E3779B9uL;
-    x = (x ^ identity->vid) * 0x85EBCA6BuL;
-    x = (x ^ (x >> 15) ^ identity->pid) * 0xC2B2AE35uL;
-    x = (x ^ (x >> 13) ^ identity->sn) * 0x85EBCA6BuL;
-    x ^= x >> 16;
-    return x != 0 ? x : 1;
-}
-
 bool pdcp_device_init(pdcp_device_t *dev, const pdcp_device_desc_t *desc, const pdcp_device_port_t *port,
                       const pdcp_device_record_t *record, uint32_t seed, uint32_t now_ms)
 {
@@ -579,14 +426,14 @@ bool pdcp_device_init(pdcp_device_t *dev, const pdcp_device_desc_t *desc, const 
     memset(dev, 0, sizeof *dev);
     dev->desc = desc;
     dev->port = port;
-    dev->random = mixed_seed(&desc->identity, seed);
+    pdcp_device_bind_seed(dev, seed);
     pdcp_txq_init(&dev->txq);
     for (uint8_t i = 0; i < PDCP_DEVICE_CHANNELS_MAX; i++) {
         unconnect(&dev->record.sources[i]);
     }
     if (record != NULL) {
         dev->record = *record;
-        if (!is_node_id(dev->record.node_id)) {
+        if (!pdcp_device_bind_is_id(dev->record.node_id)) {
             dev->record.node_id = 0;
         }
     }

@@ -1,9 +1,10 @@
-/* Bulk transfers as the device sees them: one packet under way at a time, each acknowledged [PDCP 3.2.8
- * to 3.2.10]. */
+#include "pdcp_device_bulk.h"
+
 #include <stddef.h>
 #include <string.h>
 
-#include "pdcp_device_parts.h"
+#include "pdcp_device_param.h"
+#include "pdcp_device_tx.h"
 #include "pdcp_time.h"
 
 static uint8_t packet_len(const pdcp_device_bulk_t *bulk)
@@ -17,7 +18,7 @@ static void send_packet(pdcp_device_t *dev, uint32_t now_ms)
     pdcp_device_bulk_t *bulk = &dev->bulk;
     pdcp_msg_t packet = {.code = PDCP_BULK_DATA, .packet_id = bulk->packet_id, .len = packet_len(bulk)};
     memcpy(packet.value, &bulk->bytes[bulk->done], packet.len);
-    pdcp_device_put(dev, &packet);
+    pdcp_device_tx_msg(dev, &packet);
     bulk->tries++;
     bulk->deadline_ms = now_ms + dev->ack_ms;
 }
@@ -26,7 +27,7 @@ static void answer_configure(pdcp_device_t *dev, const pdcp_msg_t *request, uint
 {
     pdcp_msg_t answer = *request;
     answer.word = size;
-    pdcp_device_answer(dev, &answer, result);
+    pdcp_device_tx_answer(dev, &answer, result);
 }
 
 void pdcp_device_bulk_on_get(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
@@ -151,5 +152,5 @@ void pdcp_device_bulk_on_packet(pdcp_device_t *dev, uint32_t now_ms, const pdcp_
         }
         dev->bulk.mode = PDCP_DEVICE_BULK_REFUSED;
     }
-    pdcp_device_answer(dev, msg, good ? PDCP_SUCCESS : PDCP_FAILURE);
+    pdcp_device_tx_answer(dev, msg, good ? PDCP_SUCCESS : PDCP_FAILURE);
 }

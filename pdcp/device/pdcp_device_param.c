@@ -1,9 +1,10 @@
-/* Parameters as the device keeps them (pdcp-bus.md 4) [PROFILE tables 2.8 to 2.10, 4.2.4]. */
+#include "pdcp_device_param.h"
+
 #include <stddef.h>
 #include <string.h>
 
 #include "pdcp_bytes.h"
-#include "pdcp_device_parts.h"
+#include "pdcp_codec.h"
 
 /* --- reading --- */
 

@@ -10,7 +10,7 @@
 #include "hostlink.h"
 #include "pdcp_codec.h"
 #include "pdcp_device.h"
-#include "pdcp_device_parts.h"
+#include "pdcp_device_param.h"
 #include "profile_tlv.h"
 #include "profile_tree.h"
 #include "profile_type.h"

@@ -7,8 +7,6 @@
 #include "pdcp_bytes.h"
 #include "pdcp_time.h"
 
-#define CONFIG_NOWHERE 0x8000u /* an offset far behind every string */
-
 /* A smaller memory has no room for a string at all: a negative array size does not compile. */
 typedef char arb_config_has_room[ARB_CONFIG_STRING_PAGES > 0 ? 1 : -1];
 
@@ -143,12 +141,10 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user
 /* Jobs -------------------------------------------------------------------------------------------------- */
 
 /* With no job under way due_ms is the time of the last step. */
-static void start(arb_config_t *config, phase_t phase, const uint8_t *piece)
+static void start(arb_config_t *config, phase_t phase)
 {
     config->phase = (uint8_t)phase;
     config->polls = 0;
-    config->piece = piece;
-    config->count_at = CONFIG_NOWHERE;
 }
 
 static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t status)
@@ -160,7 +156,7 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
     } else if (status == ARB_CONFIG_ERR_STORAGE) {
         count(config, ARB_CONFIG_FAILURES);
     }
-    if (config->piece != NULL) {
+    if (config->splice.piece != NULL) {
         config->raw_status = (int8_t)status;
     }
 }
@@ -170,24 +166,22 @@ arb_config_status_t arb_config_read(arb_config_t *config)
     if (arb_config_busy(config)) {
         return ARB_CONFIG_ERR_BUSY;
     }
-    start(config, PHASE_READ, NULL);
+    config->splice.piece = NULL;
+    start(config, PHASE_READ);
     open_string(config, config->newest.area, config->length, config->user->on_link);
     return ARB_CONFIG_OK;
 }
 
 /* Replaces the configuration number by block bytes. */
-static void start_change(arb_config_t *config, uint8_t number, uint16_t block)
+static void start_change(arb_config_t *config, uint8_t number, uint8_t links, uint16_t block)
 {
-    config->number = number;
+    config->raw_at = 0;
     config->stored_new = config->stored;
     if (block != 0) {
         config->stored_new++;
     }
-    config->block = block;
-    config->raw_at = 0;
-    config->length_new = 0;
-    config->cut_to = 0;
-    start(config, PHASE_SCAN, NULL);
+    arb_splice_replace(&config->splice, number, links, block);
+    start(config, PHASE_SCAN);
     open_string(config, config->newest.area, config->length, NULL);
 }
 
@@ -204,9 +198,7 @@ arb_config_status_t arb_config_save(arb_config_t *config, uint8_t *number, uint8
             (*number)++;
         } while (arb_config_has(config, *number));
     }
-    config->count = count;
-    start_change(config, *number,
-                 (uint16_t)(PROFILE_TLV_CONFIGURATION_BYTES + (uint16_t)PROFILE_TLV_LINK_BYTES * count));
+    start_change(config, *number, count, arb_splice_block(count));
     return ARB_CONFIG_OK;
 }
 
@@ -218,7 +210,7 @@ arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number)
     if (!arb_config_has(config, number)) {
         return ARB_CONFIG_ERR_NUMBER;
     }
-    start_change(config, number, 0);
+    start_change(config, number, 0, 0);
     return ARB_CONFIG_OK;
 }
 
@@ -241,10 +233,10 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
         config->length_new = total;
         config->same = total == config->length;
     }
-    start(config, PHASE_NEW, bytes);
+    arb_splice_insert(&config->splice, offset, bytes, len);
+    start(config, PHASE_NEW);
     config->raw_status = ARB_CONFIG_ERR_BUSY;
     config->raw_at = 0; /* until the piece is in */
-    config->cut_from = offset;
     config->at = offset;
     config->until = (uint16_t)(offset + len);
     return ARB_CONFIG_OK;
@@ -267,50 +259,15 @@ arb_config_status_t arb_config_read_raw(const arb_config_t *config, const arb_nv
 
 /* The new string ---------------------------------------------------------------------------------------- */
 
-/* Entry k of what a save puts in: the number of configurations, then the new one. */
-static void put_entry(const arb_config_t *config, uint16_t k, uint8_t entry[PROFILE_TLV_ENTRY_BYTES])
-{
-    if (k == 0) { /* only what had none may not have said so */
-        profile_tlv_put(entry, PROFILE_TLV_CONFIGURATIONS, 1);
-    } else if (k == 1) {
-        profile_tlv_put(entry, PROFILE_TLV_CONFIGURATION, config->number);
-    } else if (k == 2) {
-        profile_tlv_put(entry, PROFILE_TLV_LINKS, config->count);
-    } else {
-        const uint8_t link_k = (uint8_t)((k - 3) / PROFILE_TLV_LINK_ENTRIES);
-        profile_link_t link;
-        config->user->link(config->ctx, link_k, &link);
-        profile_tlv_put_link_entry(entry, (uint8_t)(link_k + 1), &link,
-                                   (uint8_t)((k - 3) % PROFILE_TLV_LINK_ENTRIES));
-    }
-}
-
-/* Bytes at to at + run of the new string: the stored one with the host's piece, or the new configuration,
- * instead of what is cut out of it. Returns run, 1 to len; 0: the memory has failed. */
+/* Bytes at to at + len of the new string, or the first of them. Returns how many; 0: the memory has failed.
+ */
 static uint16_t put_run(const arb_config_t *config, const arb_nvm_t *nvm, uint16_t at, uint8_t *bytes,
                         uint16_t len)
 {
-    uint16_t run = len;
-    uint16_t offset = (uint16_t)(at - config->cut_from);
-    if (at < config->cut_from) {
-        run = at_most(len, (uint16_t)(config->cut_from - at));
-    } else if (config->piece != NULL) {
-        memcpy(bytes, &config->piece[offset], len);
-        return len;
-    } else if (offset < config->block) {
-        uint8_t entry[PROFILE_TLV_ENTRY_BYTES];
-        if (config->count_at != CONFIG_NOWHERE) { /* the stored string has entry 0 */
-            offset = (uint16_t)(offset + PROFILE_TLV_ENTRY_BYTES);
-        }
-        const uint16_t skip = offset % PROFILE_TLV_ENTRY_BYTES;
-        put_entry(config, offset / PROFILE_TLV_ENTRY_BYTES, entry);
-        run = at_most(len, (uint16_t)(PROFILE_TLV_ENTRY_BYTES - skip));
-        memcpy(bytes, &entry[skip], run);
-        return run;
-    } else {
-        at = (uint16_t)(offset - config->block + config->cut_to);
+    if (!arb_splice_is_kept(&config->splice, &at, &len)) {
+        return arb_splice_put(&config->splice, config->user->link, config->ctx, at, bytes, len);
     }
-    return read_string(nvm, config->newest.area, at, bytes, run) ? run : 0;
+    return read_string(nvm, config->newest.area, at, bytes, len) ? len : 0;
 }
 
 /* len bytes of the new string, from config->at. False: the memory has failed. */
@@ -334,7 +291,7 @@ typedef arb_config_status_t (*phase_step_t)(arb_config_t *config, const arb_nvm_
 /* The new string, or a piece of the host's, has been compared or written to its end. */
 static arb_config_status_t end_part(arb_config_t *config)
 {
-    if (config->piece != NULL && config->until < config->length_new) {
+    if (config->splice.piece != NULL && config->until < config->length_new) {
         config->raw_at = config->until;
         config->phase = PHASE_IDLE;
         return ARB_CONFIG_OK;
@@ -351,7 +308,7 @@ static void begin_write(arb_config_t *config)
 {
     config->same = false;
     config->at = 0;
-    if (config->piece == NULL) {
+    if (config->splice.piece == NULL) {
         config->until = config->length_new;
     }
 }
@@ -365,6 +322,16 @@ static arb_config_status_t write_page(arb_config_t *config, const arb_nvm_t *nvm
     config->writing = true;
     count(config, ARB_CONFIG_PAGES);
     return ARB_CONFIG_OK;
+}
+
+/* Corrects the number of configurations if it stands in these bytes of the new string. It stands in front of
+ * the cut, and with no more than 255 configurations the low byte is all that changes. */
+static void put_count(const arb_config_t *config, uint16_t at, uint8_t *bytes, uint16_t len)
+{
+    const uint16_t low = (uint16_t)(config->splice.count_at + 1);
+    if (config->splice.has_count && low >= at && low - at < len) {
+        bytes[low - at] = config->stored_new;
+    }
 }
 
 /* Compares or writes the next bytes of the new string. */
@@ -392,51 +359,20 @@ static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
         }
         return config->at < config->until ? ARB_CONFIG_OK : end_part(config);
     }
-    /* In front of the cut, with no more than 255 configurations: the low byte is all that changes. */
-    const uint16_t count_at = (uint16_t)(config->count_at + 1 - at);
-    if (count_at < len) {
-        fresh[count_at] = config->stored_new;
-    }
+    put_count(config, at, fresh, len);
     config->crc_new = arb_crc32(at == 0 ? ARB_CRC32_INIT : config->crc_new, fresh, len);
     return write_page(config, nvm, (uint16_t)(string_address(arb_area_next(&config->newest)) + at), fresh,
                       len);
 }
 
-/* What is replaced: from the configuration of this number to the next one or the end; nothing in front of the
- * end if there is none. */
-static void scan_entry(arb_config_t *config, uint16_t at, const uint8_t entry[PROFILE_TLV_ENTRY_BYTES])
-{
-    const uint8_t code = entry[0];
-    if (code == PROFILE_TLV_CONFIGURATIONS) {
-        config->count_at = at;
-    }
-    if (code != PROFILE_TLV_CONFIGURATION && code != PROFILE_TLV_END) {
-        return;
-    }
-    if (config->cut_to == CONFIG_NOWHERE) {
-        config->cut_to = at;
-    }
-    if (code == PROFILE_TLV_END) {
-        config->length_new = (uint16_t)(at + PROFILE_TLV_ENTRY_BYTES);
-        if (config->cut_to == 0) {
-            config->cut_from = at;
-            config->cut_to = at;
-        }
-    } else if (entry[1] == config->number) {
-        config->cut_from = at;
-        config->cut_to = CONFIG_NOWHERE;
-        config->stored_new--;
-    }
-}
-
 /* The stored string has been read. */
 static arb_config_status_t end_scan(arb_config_t *config)
 {
-    if (config->count_at == CONFIG_NOWHERE) {
-        config->block = (uint16_t)(config->block + PROFILE_TLV_ENTRY_BYTES);
+    const arb_splice_t *splice = &config->splice;
+    if (splice->found == ARB_SPLICE_FOUND) {
+        config->stored_new--;
     }
-    config->length_new =
-        (uint16_t)(config->length_new - (uint16_t)(config->cut_to - config->cut_from) + config->block);
+    config->length_new = arb_splice_length(splice);
     if (config->length_new > ARB_CONFIG_STRING_MAX) {
         return ARB_CONFIG_ERR_STORAGE;
     }
@@ -444,8 +380,8 @@ static arb_config_status_t end_scan(arb_config_t *config)
     config->phase = PHASE_NEW;
     if (config->length_new == config->length) { /* then a block of another length has another last entry */
         config->same = true;
-        config->at = config->cut_from;
-        config->until = (uint16_t)(config->cut_from + config->block);
+        config->at = splice->from;
+        config->until = (uint16_t)(splice->from + splice->block);
     }
     return ARB_CONFIG_OK;
 }
@@ -458,10 +394,10 @@ static arb_config_status_t step_read(arb_config_t *config, const arb_nvm_t *nvm)
     if (!read_on(config, nvm, bytes)) {
         return ARB_CONFIG_ERR_STORAGE;
     }
-    for (uint16_t i = 0; config->phase == PHASE_SCAN && config->length_new == 0 &&
+    for (uint16_t i = 0; config->phase == PHASE_SCAN && config->splice.end == 0 &&
                          at + i + PROFILE_TLV_ENTRY_BYTES <= config->at;
          i = (uint16_t)(i + PROFILE_TLV_ENTRY_BYTES)) {
-        scan_entry(config, (uint16_t)(at + i), &bytes[i]);
+        arb_splice_scan(&config->splice, (uint16_t)(at + i), &bytes[i]);
     }
     if (config->at < config->until) {
         return ARB_CONFIG_OK;

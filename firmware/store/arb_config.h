@@ -23,6 +23,7 @@
 
 #include "arb_area.h"
 #include "arb_flags.h"
+#include "arb_splice.h"
 #include "arb_store.h"
 #include "pdcp_time.h"
 #include "profile_tlv.h"
@@ -56,9 +57,9 @@ typedef enum {
 
 /* Whose links are stored. */
 typedef struct {
-    /* Gives link k, from 0, of the configuration to be saved. Called several times for each link, in any
-     * order; what it gives must stay the same until the job is over. */
-    void (*link)(void *ctx, uint8_t k, profile_link_t *link);
+    /* Gives the links of the configuration to be saved. Called several times for each link, in any order;
+     * what it gives must stay the same until the job is over. */
+    arb_splice_link_t link;
     profile_tlv_on_link_t on_link; /* takes the links that are read */
 } arb_config_user_t;
 
@@ -82,29 +83,23 @@ typedef struct {
     uint16_t length;
     uint32_t crc; /* register behind the string */
     /* The job. */
-    uint8_t phase;  /* what it is at, 0: there is none; private to arb_config.c */
-    bool writing;   /* a page is under way */
-    uint8_t polls;  /* of a memory that is not ready */
-    uint8_t number; /* save, erase */
-    uint8_t count;  /* save: links */
-    uint8_t stored_new;
-    uint8_t from;   /* the area that is read */
-    bool same;      /* the new string is the stored one so far: none of it was written yet */
-    uint16_t at;    /* where in the string that is read, compared or written, */
-    uint16_t until; /* and where this ends */
+    uint8_t phase;      /* what it is at, 0: there is none; private to arb_config.c */
+    bool writing;       /* a page is under way */
+    uint8_t polls;      /* of a memory that is not ready */
+    uint8_t stored_new; /* save, erase: how many configurations there will be */
+    uint8_t from;       /* the area that is read */
+    bool same;          /* the new string is the stored one so far: none of it was written yet */
+    uint16_t at;        /* where in the string that is read, compared or written, */
+    uint16_t until;     /* and where this ends */
     uint16_t length_new;
-    uint16_t count_at; /* where in the stored string the number of configurations stands, */
-    uint16_t cut_from; /* what of it is replaced, */
-    uint16_t cut_to;
-    uint16_t block;    /* and by how many bytes */
-    uint32_t crc_new;  /* registers: of the new string, */
-    uint32_t crc_read; /* of what was read */
+    arb_splice_t splice; /* how the new string comes of the stored one; a piece: the host's job */
+    uint32_t crc_new;    /* registers: of the new string, */
+    uint32_t crc_read;   /* of what was read */
     uint32_t due_ms;
     const arb_config_user_t *user;
     void *ctx;
-    const uint8_t *piece; /* the host's; NULL: another job */
-    int8_t raw_status;    /* how the host's last piece ended; ARB_CONFIG_ERR_BUSY: it is under way */
-    uint16_t raw_at;      /* bytes that are in of the host's write, which outlasts the job of a piece */
+    int8_t raw_status; /* how the host's last piece ended; ARB_CONFIG_ERR_BUSY: it is under way */
+    uint16_t raw_at;   /* bytes that are in of the host's write, which outlasts the job of a piece */
     profile_tlv_t reader;
 } arb_config_t;
 

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "arb_limits.h"
 #include "pdcp_time.h"
 
 /* On a target with 16-bit pointers the whole application has to fit its budget: a negative array size does

@@ -11,14 +11,7 @@
 
 #include "pdcp_nodes.h"
 #include "profile_config.h"
-
-#ifndef PROFILE_LINKS_MAX
-#define PROFILE_LINKS_MAX 48 /* links of the active configuration, 1 to 254 (D-PRO-11) */
-#endif
-
-#ifndef PROFILE_PARTS_MAX
-#define PROFILE_PARTS_MAX 40 /* devices that these links name, 2 to 254 */
-#endif
+#include "profile_limits.h"
 
 typedef struct {
     pdcp_identity_t identity;

@@ -10,9 +10,8 @@
 
 #include "pdcp_bits.h"
 #include "pdcp_nodes.h"
+#include "profile_limits.h"
 #include "profile_links.h"
-
-enum { PROFILE_BANNED_MAX = 8 };
 
 #define PROFILE_CHANNEL_BYTES PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)
 #define PROFILE_PLACE_BYTES PDCP_BIT_BYTES(PDCP_DEVICES_MAX)

@@ -4,10 +4,12 @@
 #include <string.h>
 
 #include "arb_app.h"
+#include "arb_limits.h"
 #include "board.h"
 #include "clock.h"
 #include "ecan1.h"
 #include "nvm.h"
+#include "part.h"
 #include "pdcp_time.h"
 #include "sys.h"
 #include "uart1.h"
@@ -15,6 +17,10 @@
 #ifndef FIRMWARE_BAUD
 #define FIRMWARE_BAUD 128000uL
 #endif
+
+/* An image with storage in flash is built for fewer pages than can be addressed; the flash keeps so many. */
+PART_ASSERT(firmware_keeps_to_the_pages_of_the_flash,
+            ARB_NVM_PAGES == HAL_NVM_SIZE / HAL_NVM_PAGE || ARB_NVM_PAGES <= NVM_FLASH_PAGES);
 
 enum { FRAMES = 8, HOST_BYTES = 32, BLINK_MS = 128 };
 

@@ -17,6 +17,7 @@
 #include "arb_hostevents.h"
 #include "arb_hostrx.h"
 #include "arb_limb.h"
+#include "arb_limits.h"
 #include "arb_nvm.h"
 #include "arb_port.h"
 #include "arb_store.h"
@@ -24,17 +25,9 @@
 #include "pdcp_bits.h"
 
 enum {
-    ARB_HELD_MAX = 4,             /* D-API-3 */
     ARB_HOST_NOT_READY_MS = 2000, /* a running setup is waited for so long (D-API-6) */
     ARB_HOST_ANSWER_MS = 3000     /* every request has its answer within this time (D-API-3) */
 };
-
-/* Payloads of the held requests together: the longest one and three short ones. A request that does not fit
- * is answered like a fifth one (D-API-9). */
-#define ARB_HELD_BYTES (ARB_HOST_REQUEST_MAX + 3 * 24)
-
-/* Answers out of order that wait behind the one being sent: three of the longest kind, 8 + 8 + 2 bytes. */
-#define ARB_URGENT_BYTES 54
 
 /* What the API speaks to. */
 typedef struct {

@@ -20,10 +20,6 @@ enum {
     ARB_HOST_CRC = 2     /* bytes */
 };
 
-/* Longest payloads: a set request is dev, channel index, parameter id and the value; an answer is a value. */
-#define ARB_HOST_REQUEST_MAX (8 + PDCP_PARAMETER_MAX)
-#define ARB_HOST_ANSWER_MAX PDCP_PARAMETER_MAX
-
 /* Request ids; the success answer is id + 1, the failure answer id + 2 [API 3.2]. */
 enum {
     ARB_MSG_UNKNOWN_ID = 0x2200, /* answer to an id that does not exist */

@@ -12,6 +12,7 @@
 #include <stdint.h>
 
 #include "arb_hostcodec.h"
+#include "arb_limits.h"
 #include "pdcp_arb.h"
 
 typedef enum {
@@ -28,10 +29,8 @@ typedef enum {
 typedef enum { ARB_BUS_ACTIVE = 0, ARB_BUS_PASSIVE = 1, ARB_BUS_OFF = 2, ARB_BUS_SILENT = 3 } arb_bus_state_t;
 
 enum {
-    ARB_EVENT_HEAD = 5,      /* kind8, time32 */
-    ARB_EVENT_DATA_MAX = 15, /* a link */
-    ARB_EVENT_QUEUE = 192,   /* bytes; 9 to 17 events */
-    ARB_EVENT_FRAMES = 64    /* bytes of the queue beyond which no CAN frame is taken */
+    ARB_EVENT_HEAD = 5,     /* kind8, time32 */
+    ARB_EVENT_DATA_MAX = 15 /* a link */
 };
 
 typedef struct {

@@ -13,6 +13,7 @@
 
 #include "arb_error.h"
 #include "arb_hostcodec.h"
+#include "arb_limits.h"
 
 /* Silence inside a message after which it is given up (D-API-2). */
 #define ARB_HOSTRX_TIMEOUT_MS 100

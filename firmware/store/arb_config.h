@@ -23,6 +23,7 @@
 
 #include "arb_area.h"
 #include "arb_flags.h"
+#include "arb_limits.h"
 #include "arb_splice.h"
 #include "arb_store.h"
 #include "pdcp_time.h"

@@ -14,13 +14,6 @@
 
 #include "arb_port.h"
 
-/* Different pages that the memory can keep, of the 512 that are addressed. A log in program flash keeps fewer
- * (-DARB_NVM_PAGES=47). Identities and flags get theirs first, the longest configuration string follows from
- * what is left (arb_config.h): so such a memory is never too full for a write (D-MCU-6). */
-#ifndef ARB_NVM_PAGES
-#define ARB_NVM_PAGES 512
-#endif
-
 enum {
     ARB_NVM_FLAGS_AT = 1024,
     ARB_NVM_CONFIG_AT = 2048,

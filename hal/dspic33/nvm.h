@@ -9,6 +9,11 @@
 #define NVM_H
 
 #include "hal_nvm.h"
+#include "part.h"
+
+/* Different pages that nvm_flash.c keeps: an area has a place for each, and one for its header. */
+#define NVM_FLASH_PAGES (PART_FLASH_STORE_PAGES * PART_FLASH_PAGE / NVM_FLASH_SLOT - 1u)
+#define NVM_FLASH_SLOT 64u /* addresses that a page takes there, two for an instruction */
 
 /* The only one there is; never NULL. Opens the I2C bus if it stands there. clock_start comes first. */
 hal_nvm_t *nvm_open(void);

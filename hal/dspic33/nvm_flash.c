@@ -18,8 +18,8 @@
  *
  * An area holds SLOTS - 1 entries, so that many pages can be in use: a write to one more fails, a write to
  * one of them still works, with a move each time. A page once written is never given up: who uses the memory
- * has to keep to so many different pages. ARB_NVM_PAGES (arb_nvm.h) does it for the arbitrator, whose longest
- * configuration string follows from it. */
+ * has to keep to NVM_FLASH_PAGES different ones. Whoever joins it to the memory (firmware/dspic33) makes sure
+ * of that. */
 #include <string.h>
 
 #include "flash.h"
@@ -28,7 +28,7 @@
 
 /* In addresses, two for an instruction. */
 #define AREA_SIZE (PART_FLASH_STORE_PAGES * PART_FLASH_PAGE)
-#define SLOT_SIZE 64u
+#define SLOT_SIZE NVM_FLASH_SLOT
 #define SLOTS ((uint16_t)(AREA_SIZE / SLOT_SIZE))
 
 enum {
@@ -43,9 +43,6 @@ PART_ASSERT(nvm_flash_areas_in_front_of_the_serial_number,
             PART_FLASH_STORE_AT + 2u * AREA_SIZE <= PART_SERIAL_AT);
 PART_ASSERT(nvm_flash_areas_reached_with_16_bits,
             PART_FLASH_STORE_AT >> 16 == (PART_FLASH_STORE_AT + 2u * AREA_SIZE - 1u) >> 16);
-#ifdef ARB_NVM_PAGES
-PART_ASSERT(nvm_flash_holds_what_the_arbitrator_uses, ARB_NVM_PAGES <= AREA_SIZE / SLOT_SIZE - 1u);
-#endif
 
 /* The linker is to keep code and constants out of both areas. An element is one instruction. */
 static const uint16_t nvm_flash_first[AREA_SIZE / 2] PART_RESERVED(PART_FLASH_STORE_AT);

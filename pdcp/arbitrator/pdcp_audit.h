@@ -25,9 +25,8 @@
 struct pdcp_bus;
 
 enum {
-    PDCP_AUDIT_MS = 60,      /* between two questions */
-    PDCP_AUDIT_REPAIRS = 3,  /* of one link within a minute */
-    PDCP_AUDIT_FOUND_MAX = 8 /* channels whose differences are counted at a time; those of others are not */
+    PDCP_AUDIT_MS = 60,    /* between two questions */
+    PDCP_AUDIT_REPAIRS = 3 /* of one link within a minute */
 };
 
 /* What may be asked of a channel, what data depend on first. */

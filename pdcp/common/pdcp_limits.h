@@ -1,4 +1,5 @@
-/* Capacities and budgets: every table of the arbitrator gets its size here and nowhere else.
+/* Capacities of the bus: every table of pdcp/common and pdcp/arbitrator gets its size here and nowhere else.
+ * The other rooms have theirs in pdcp_device_limits.h, profile_limits.h and arb_limits.h.
  *
  * The numbers are those of the smallest part, a dsPIC33FJ64MC802 with 16 KB RAM (pdcp-bus.md 11). A larger
  * part may define its own before this header is read (-DPDCP_DEVICES_MAX=64). */
@@ -34,10 +35,10 @@
 #define PDCP_NEEDS_BYTES 320
 #endif
 
+/* Channels whose differences the audit counts at a time; those of others are not counted. */
+#define PDCP_AUDIT_FOUND_MAX 8
+
 /* Longest parameter value that passes between host and device (D-BUS-13). */
 #define PDCP_PARAMETER_MAX 512
-
-/* RAM budget of the whole application, on a target with 16-bit int and pointers. */
-#define ARB_RAM_BUDGET 12032
 
 #endif

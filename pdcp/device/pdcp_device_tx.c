@@ -3,8 +3,6 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { ANSWER_ROOM = 4 }; /* places of the queue that only answers may take */
-
 bool pdcp_device_tx_frame(pdcp_device_t *dev, const can_frame_t *frame)
 {
     const pdcp_txq_put_t put = pdcp_txq_put(&dev->txq, frame);
@@ -54,7 +52,7 @@ void pdcp_device_tx_beacon(pdcp_device_t *dev)
 
 bool pdcp_device_tx_has_room(const pdcp_device_t *dev)
 {
-    return dev->txq.count < PDCP_TX_MAX - ANSWER_ROOM;
+    return dev->txq.count < PDCP_TX_MAX - PDCP_DEVICE_ANSWERS_MAX;
 }
 
 bool pdcp_device_tx_peek(const pdcp_device_t *dev, can_frame_t *frame)

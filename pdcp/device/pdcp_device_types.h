@@ -9,13 +9,9 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pdcp_device_limits.h"
 #include "pdcp_spec.h"
 #include "pdcp_txq.h"
-
-/* Channels of one device, 1 to 254. A larger or smaller device defines its own before this header is read. */
-#ifndef PDCP_DEVICE_CHANNELS_MAX
-#define PDCP_DEVICE_CHANNELS_MAX 32
-#endif
 
 /* Bytes that stand in flash or elsewhere. They belong to the caller and outlive the device. */
 typedef struct {

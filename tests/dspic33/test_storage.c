@@ -11,6 +11,8 @@
 #include "part.h"
 #include "unity.h"
 
+PART_ASSERT(storage_keeps_to_the_pages_of_the_flash, ARB_NVM_PAGES <= NVM_FLASH_PAGES);
+
 enum {
     LINKS = 3,
     STEPS_MAX = 20000,

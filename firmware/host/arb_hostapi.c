@@ -4,7 +4,7 @@
 #include <string.h>
 
 #include "arb_error.h"
-#include "arb_hostcall.h"
+#include "arb_call.h"
 #include "pdcp_time.h"
 
 /* The longest failure answer, 230Fh. */
@@ -64,7 +64,7 @@ static uint16_t finish(arb_hostapi_t *api, uint8_t *frame, const arb_hostrx_requ
             len = ARB_RESET_RESULTS;
         }
     }
-    return arb_host_finish(frame, id, request->reference, len);
+    return arb_hostcodec_finish(frame, id, request->reference, len);
 }
 
 static bool urgent_has_room(const arb_hostapi_t *api)

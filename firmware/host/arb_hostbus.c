@@ -2,7 +2,7 @@
 #include <string.h>
 
 #include "arb_error.h"
-#include "arb_hostcall.h"
+#include "arb_call.h"
 #include "pdcp_bytes.h"
 #include "pdcp_time.h"
 
@@ -24,7 +24,7 @@ uint8_t arb_hostbus_system_info(arb_call_t *call)
 static void put_info(arb_call_t *call, const pdcp_identity_t *identity, uint8_t index, uint16_t type,
                      uint16_t profile)
 {
-    arb_host_put_channel(&call->answer[0], identity, index);
+    arb_hostcodec_put_channel(&call->answer[0], identity, index);
     pdcp_bytes_put_u16(&call->answer[7], type);
     pdcp_bytes_put_u16(&call->answer[9], profile);
     call->answer_len = 11;
@@ -75,7 +75,7 @@ uint8_t arb_hostbus_link_info(arb_call_t *call)
     if (number == PDCP_NONE) {
         return ARB_ERR_NUMBER;
     }
-    arb_host_put_link(call->answer, nodes, &nodes->channels[number]);
+    arb_hostcodec_put_link(call->answer, nodes, &nodes->channels[number]);
     call->answer_len = 15;
     return ARB_OK;
 }

@@ -17,7 +17,7 @@ static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
     return crc;
 }
 
-uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
+uint8_t arb_hostcodec_crc8(const uint8_t header[ARB_HOST_HEADER])
 {
     uint8_t crc = 0;
     for (size_t i = 2; i < ARB_HOST_HEADER; i++) {
@@ -28,7 +28,7 @@ uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER])
     return crc;
 }
 
-uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len)
+uint16_t arb_hostcodec_crc16(const uint8_t *payload, uint16_t len)
 {
     uint16_t crc = 0xFFFF;
     for (uint16_t i = 0; i < len; i++) {
@@ -44,7 +44,7 @@ uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len)
     return crc;
 }
 
-uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)
+uint16_t arb_hostcodec_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len)
 {
     const uint16_t size = len != 0 ? (uint16_t)(len + ARB_HOST_CRC) : 0;
     frame[0] = ARB_HOST_SYNC1;
@@ -52,22 +52,22 @@ uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_
     pdcp_bytes_put_u16(&frame[2], id);
     frame[4] = reference;
     pdcp_bytes_put_u16(&frame[6], size);
-    frame[5] = arb_host_crc8(frame);
+    frame[5] = arb_hostcodec_crc8(frame);
     if (len != 0) {
-        pdcp_bytes_put_u16(&frame[ARB_HOST_HEADER + len], arb_host_crc16(&frame[ARB_HOST_HEADER], len));
+        pdcp_bytes_put_u16(&frame[ARB_HOST_HEADER + len], arb_hostcodec_crc16(&frame[ARB_HOST_HEADER], len));
     }
     return (uint16_t)(ARB_HOST_HEADER + size);
 }
 
-void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index)
+void arb_hostcodec_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index)
 {
     pdcp_bytes_put_identity(bytes, identity);
     bytes[6] = index;
 }
 
-void arb_host_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input)
+void arb_hostcodec_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input)
 {
-    arb_host_put_channel(&bytes[0], &input->source, input->source_index);
-    arb_host_put_channel(&bytes[7], &nodes->nodes[input->node].identity, input->index);
+    arb_hostcodec_put_channel(&bytes[0], &input->source, input->source_index);
+    arb_hostcodec_put_channel(&bytes[7], &nodes->nodes[input->node].identity, input->index);
     bytes[14] = input->link;
 }

@@ -52,19 +52,19 @@ typedef struct {
 } arb_out_t;
 
 /* Polynomial 07h, initial 00h, not reflected; over header bytes 2, 3, 4, 6, 7 (D-API-1). */
-uint8_t arb_host_crc8(const uint8_t header[ARB_HOST_HEADER]);
+uint8_t arb_hostcodec_crc8(const uint8_t header[ARB_HOST_HEADER]);
 
 /* Polynomial 1021h, initial FFFFh, not reflected; over the payload (D-API-1). */
-uint16_t arb_host_crc16(const uint8_t *payload, uint16_t len);
+uint16_t arb_hostcodec_crc16(const uint8_t *payload, uint16_t len);
 
 /* Completes a message whose payload of len bytes stands at frame + ARB_HOST_HEADER: writes header and CRC16.
  * Returns the length of the whole message. frame[] needs room for header, payload and CRC16. */
-uint16_t arb_host_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len);
+uint16_t arb_hostcodec_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len);
 
 /* A channel as messages name it: the identity of its device, its index. */
-void arb_host_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
+void arb_hostcodec_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
 
 /* The link of an input as 220Eh and its event tell of it: output, input, status. */
-void arb_host_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input);
+void arb_hostcodec_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input);
 
 #endif

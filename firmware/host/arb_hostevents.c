@@ -51,7 +51,7 @@ static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t
     uint8_t *data =
         put(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST, 7);
     if (data != NULL) {
-        arb_host_put_channel(data, &node->identity, node->node_id);
+        arb_hostcodec_put_channel(data, &node->identity, node->node_id);
     }
 }
 
@@ -64,9 +64,9 @@ static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t n
     if (data == NULL) {
         return;
     }
-    arb_host_put_link(data, &arb->bus.nodes, input);
+    arb_hostcodec_put_link(data, &arb->bus.nodes, input);
     if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
-        arb_host_put_channel(data, &job->old_source, job->old_index);
+        arb_hostcodec_put_channel(data, &job->old_source, job->old_index);
     }
 }
 
@@ -96,7 +96,7 @@ static void put_audit(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t 
     const pdcp_channel_t *channel = &nodes->channels[event->channel];
     uint8_t *data = put(events, now_ms, ARB_EVENT_AUDIT, 8);
     if (data != NULL) {
-        arb_host_put_channel(data, &nodes->nodes[channel->node].identity, channel->index);
+        arb_hostcodec_put_channel(data, &nodes->nodes[channel->node].identity, channel->index);
         data[7] = (uint8_t)event->status;
     }
 }
@@ -146,7 +146,7 @@ bool arb_hostevents_next(arb_hostevents_t *events)
         events->used = (uint8_t)(events->used - 1 - len);
         memmove(events->queue, &events->queue[1 + len], events->used);
         if (arb_hostevents_wants(events, (arb_event_kind_t)events->message[ARB_HOST_HEADER])) {
-            events->out.len = arb_host_finish(events->message, ARB_MSG_EVENT, 0, len);
+            events->out.len = arb_hostcodec_finish(events->message, ARB_MSG_EVENT, 0, len);
         }
     }
     return events->out.len != 0;

@@ -49,7 +49,7 @@ void arb_hostrx_clear(arb_hostrx_t *rx)
 
 static bool crc8_matches(const uint8_t *header)
 {
-    return header[5] == arb_host_crc8(header);
+    return header[5] == arb_hostcodec_crc8(header);
 }
 
 /* Bytes of the message at the front, as its header says. */
@@ -89,7 +89,7 @@ static front_t look_inside(const arb_hostrx_t *rx, uint16_t total)
 
 static bool crc16_matches(const uint8_t *payload, uint16_t len)
 {
-    return len == 0 || pdcp_bytes_get_u16(&payload[len]) == arb_host_crc16(payload, len);
+    return len == 0 || pdcp_bytes_get_u16(&payload[len]) == arb_hostcodec_crc16(payload, len);
 }
 
 /* All of the message at the front is here. */

@@ -22,7 +22,6 @@
 #include <stdint.h>
 
 #include "arb_area.h"
-#include "arb_flags.h"
 #include "arb_limits.h"
 #include "arb_splice.h"
 #include "arb_store.h"

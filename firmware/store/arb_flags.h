@@ -14,7 +14,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arb_area.h"
+#include "arb_record.h"
 
 enum {
     ARB_FLAGS_LENGTH = 1, /* bytes of settings that are written */

@@ -15,7 +15,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "arb_area.h"
+#include "arb_record.h"
 #include "pdcp_bind.h"
 #include "pdcp_time.h"
 

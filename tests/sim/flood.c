@@ -225,7 +225,7 @@ static void ask_for_links(flood_t *flood)
     for (int number = 1; number <= FLOOD_LINKS + 1; number++) {
         uint8_t bytes[ARB_HOST_HEADER + 1 + ARB_HOST_CRC];
         bytes[ARB_HOST_HEADER] = (uint8_t)number;
-        const uint16_t len = arb_host_finish(bytes, ARB_MSG_LINK_INFO, (uint8_t)number, 1);
+        const uint16_t len = arb_hostcodec_finish(bytes, ARB_MSG_LINK_INFO, (uint8_t)number, 1);
         (void)arb_app_on_bytes(&limb->app, sim_world_ms(&limb->world), bytes, len);
     }
     sim_world_touch_app(&limb->world);

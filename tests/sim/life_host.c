@@ -413,7 +413,7 @@ void life_host_ask(life_host_t *host, const limb_t *limb)
     request->mask = request->len == 2 ? pdcp_bytes_get_u16(payload) : payload[0];
     request->reference = next_reference(host);
     request->may_be_lost = host->garbage_end == host->put_bytes;
-    const uint16_t total = arb_host_finish(bytes, request->id, request->reference, request->len);
+    const uint16_t total = arb_hostcodec_finish(bytes, request->id, request->reference, request->len);
     put_bytes(host, bytes, total);
     request->end_byte = host->put_bytes;
     host->open_count++;
@@ -448,7 +448,7 @@ void life_host_babble(life_host_t *host, const limb_t *limb, uint32_t now_ms)
     bytes[ARB_HOST_HEADER + 6] = 0;
     bytes[ARB_HOST_HEADER + 7] = 241;
     const uint16_t total =
-        arb_host_finish(bytes, is_long ? ARB_MSG_SET_PARAMETER : ARB_MSG_GET_PARAMETER, 0, len);
+        arb_hostcodec_finish(bytes, is_long ? ARB_MSG_SET_PARAMETER : ARB_MSG_GET_PARAMETER, 0, len);
     const uint32_t least = is_long ? ARB_HOST_HEADER + 8 : 1;
     put_bytes(host, bytes, least + chance(host, total - least));
     host->garbage_end = host->put_bytes;
@@ -683,7 +683,7 @@ static uint32_t take_message(life_host_t *host, uint32_t now_ms)
         return 0;
     }
     const uint16_t size = pdcp_bytes_get_u16(&host->in[6]);
-    if (host->in[5] != arb_host_crc8(host->in)) {
+    if (host->in[5] != arb_hostcodec_crc8(host->in)) {
         TEST_ASSERT_TRUE_MESSAGE(host->stale, "CRC8 of an answer");
         return 1;
     }
@@ -693,7 +693,7 @@ static uint32_t take_message(life_host_t *host, uint32_t now_ms)
     const uint16_t len = (uint16_t)(size != 0 ? size - ARB_HOST_CRC : 0);
     const uint8_t *payload = &host->in[ARB_HOST_HEADER];
     if (size != 0) {
-        TEST_ASSERT_EQUAL_HEX16_MESSAGE(arb_host_crc16(payload, len), pdcp_bytes_get_u16(&payload[len]),
+        TEST_ASSERT_EQUAL_HEX16_MESSAGE(arb_hostcodec_crc16(payload, len), pdcp_bytes_get_u16(&payload[len]),
                                         "CRC16");
     }
     on_message(host, now_ms, pdcp_bytes_get_u16(&host->in[2]), host->in[4], payload, len);

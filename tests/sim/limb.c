@@ -335,7 +335,7 @@ uint16_t limb_ask(limb_t *limb, uint16_t id, const uint8_t *payload, uint16_t le
     if (len != 0) {
         memcpy(&bytes[ARB_HOST_HEADER], payload, len);
     }
-    const uint16_t total = arb_host_finish(bytes, id, 1, len);
+    const uint16_t total = arb_hostcodec_finish(bytes, id, 1, len);
     limb->answer_len = 0;
     TEST_ASSERT_EQUAL(total, arb_app_on_bytes(&limb->app, sim_world_ms(&limb->world), bytes, total));
     sim_world_touch_app(&limb->world);

@@ -154,7 +154,7 @@ void hostlink_ask(exchange_t *x, uint16_t id, uint8_t reference, const uint8_t *
     if (len != 0) {
         memcpy(&bytes[ARB_HOST_HEADER], payload, len);
     }
-    hostlink_bytes(x, bytes, arb_host_finish(bytes, id, reference, len));
+    hostlink_bytes(x, bytes, arb_hostcodec_finish(bytes, id, reference, len));
 }
 
 static void drop_taken(void)
@@ -183,11 +183,11 @@ uint16_t hostlink_take(const uint8_t **payload, uint16_t *len)
     const uint16_t size = (uint16_t)(out[6] | out[7] << 8);
     TEST_ASSERT_EQUAL_HEX8(0xFE, out[0]);
     TEST_ASSERT_EQUAL_HEX8(0x19, out[1]);
-    TEST_ASSERT_EQUAL_HEX8(arb_host_crc8(out), out[5]);
+    TEST_ASSERT_EQUAL_HEX8(arb_hostcodec_crc8(out), out[5]);
     *payload = &out[8];
     *len = size != 0 ? (uint16_t)(size - 2) : 0;
     if (size != 0) {
-        TEST_ASSERT_EQUAL_HEX16(arb_host_crc16(*payload, *len), out[8 + *len] | out[9 + *len] << 8);
+        TEST_ASSERT_EQUAL_HEX16(arb_hostcodec_crc16(*payload, *len), out[8 + *len] | out[9 + *len] << 8);
     }
     taken = 8u + size;
     return (uint16_t)(out[2] | out[3] << 8);

@@ -374,7 +374,7 @@ static void test_a_stall_of_the_host_loses_no_request(void)
     uint8_t stream[8 * 12];
     for (unsigned i = 0; i < 12; i++) {
         request[4] = (uint8_t)i;
-        request[5] = arb_host_crc8(request);
+        request[5] = arb_hostcodec_crc8(request);
         memcpy(&stream[8 * i], request, 8);
     }
     hostlink_room(0);

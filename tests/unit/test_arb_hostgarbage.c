@@ -73,7 +73,7 @@ static void expect_an_answer(void)
     uint16_t len;
     bool answered = false;
     reference++;
-    (void)arb_host_finish(request, 0x2201, reference, 0);
+    (void)arb_hostcodec_finish(request, 0x2201, reference, 0);
     size_t done = 0;
     for (int i = 0; i < 50 && !answered; i++) {
         done += arb_app_on_bytes(&app, x.now_ms, &request[done], (uint16_t)(sizeof request - done));
@@ -134,7 +134,7 @@ static void random_messages(bool strict)
             static const uint8_t dev[] = {2, 0, 2, 0, 4, 0};
             memcpy(&bytes[ARB_HOST_HEADER], dev, sizeof dev);
         }
-        uint16_t total = arb_host_finish(bytes, id, (uint8_t)n, len);
+        uint16_t total = arb_hostcodec_finish(bytes, id, (uint8_t)n, len);
         if (chance(4) == 0) {
             pdcp_bytes_put_u16(&bytes[6], (uint16_t)chance(0x10000));
         }
@@ -169,7 +169,7 @@ static void test_truncated_messages(void)
         for (size_t cut = 0; cut <= sizeof bytes; cut++) {
             hostlink_start(&x, &app, strict != 0);
             memcpy(&bytes[ARB_HOST_HEADER], payload, sizeof payload);
-            (void)arb_host_finish(bytes, 0x230A, 1, sizeof payload);
+            (void)arb_hostcodec_finish(bytes, 0x230A, 1, sizeof payload);
             hand_in(bytes, cut);
             expect_an_answer();
             let_it_finish();

@@ -56,14 +56,14 @@ static int silence_until(uint32_t now_ms)
 static void test_check_values(void)
 {
     const uint8_t digits[] = "123456789";
-    TEST_ASSERT_EQUAL_HEX16(0x29B1, arb_host_crc16(digits, 9));
+    TEST_ASSERT_EQUAL_HEX16(0x29B1, arb_hostcodec_crc16(digits, 9));
     /* CRC8 is taken over header bytes 2, 3, 4, 6, 7 alone; its check value has nine bytes, and the polynomial
      * 07h with initial value 00h makes of 00 00 00 00 01 its own polynomial, of 00 00 00 01 00 that times
      * x^8. */
     const uint8_t one[ARB_HOST_HEADER] = {0xFF, 0xFF, 0, 0, 0, 0xFF, 0, 1};
-    TEST_ASSERT_EQUAL_HEX8(0x07, arb_host_crc8(one));
+    TEST_ASSERT_EQUAL_HEX8(0x07, arb_hostcodec_crc8(one));
     const uint8_t two[ARB_HOST_HEADER] = {0xFF, 0xFF, 0, 0, 0, 0xFF, 1, 0};
-    TEST_ASSERT_EQUAL_HEX8(0x15, arb_host_crc8(two));
+    TEST_ASSERT_EQUAL_HEX8(0x15, arb_hostcodec_crc8(two));
 }
 
 static void test_a_request_without_a_payload(void)

@@ -4,7 +4,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#include "arb_hostcall.h"
+#include "arb_call.h"
 #include "arb_hostext.h"
 #include "arb_version.h"
 #include "hostlink.h"

@@ -1,4 +1,4 @@
-#include "arb_hostcall.h"
+#include "arb_call.h"
 
 #include "pdcp_bytes.h"
 #include "pdcp_time.h"

@@ -1,11 +1,11 @@
 /* What the files of the host API share: a request being served, and what a handler of a message gets and
  * says. Only arb_hostapi.c (queue, answers), arb_hostbus.c (2201h to 230Dh) and arb_hostext.c (24xxh) use
  * this. */
-#ifndef ARB_HOSTCALL_H
-#define ARB_HOSTCALL_H
+#ifndef ARB_CALL_H
+#define ARB_CALL_H
 
 #include "arb_error.h"
-#include "arb_hostapi.h"
+#include "arb_hoststate.h"
 
 /* What a handler says: an error code; ARB_OK, with a success payload of answer_len bytes; or that somebody
  * else has to speak first: it is called again with every step until it says something else. */

@@ -1,0 +1,104 @@
+#include "arb_record.h"
+
+#include "arb_crc.h"
+#include "pdcp_bytes.h"
+
+static uint16_t area_address(const arb_record_t *record, uint8_t area)
+{
+    return (uint16_t)(record->address + (area == 0 ? 0 : record->size));
+}
+
+/* Reads an area whose header is good so far. False: it is not good. */
+static bool is_whole(const arb_record_t *record, const arb_nvm_t *nvm, uint16_t address, uint8_t count)
+{
+    uint16_t left = arb_record_length(record, count);
+    uint32_t crc = ARB_CRC32_INIT;
+    uint8_t byte;
+    if (left > record->size) {
+        return false;
+    }
+    for (; left > 0; left--) {
+        if (!arb_nvm_read(nvm, address, &byte, 1)) {
+            return false;
+        }
+        crc = arb_crc32(crc, &byte, 1);
+        address++;
+    }
+    return crc == ARB_CRC32_RESIDUE;
+}
+
+void arb_record_load(const arb_record_t *record, const arb_nvm_t *nvm, arb_area_t *newest, uint8_t *damaged,
+                     void *table)
+{
+    uint8_t bytes[ARB_RECORD_ENTRY_MAX];
+    uint8_t count = 0;
+    newest->area = ARB_AREAS;
+    for (uint8_t area = 0; area < (uint8_t)ARB_AREAS; area++) {
+        const uint16_t address = area_address(record, area);
+        const arb_area_state_t state = arb_area_open(nvm, address, record->letter, bytes, ARB_AREA_HEADER);
+        if (state == ARB_AREA_GOOD && is_whole(record, nvm, address, bytes[3])) {
+            if (arb_area_offer(newest, area, bytes)) {
+                count = bytes[3];
+            }
+        } else if (state != ARB_AREA_EMPTY) {
+            (*damaged)++;
+        }
+    }
+    uint16_t address = (uint16_t)(area_address(record, newest->area) + ARB_AREA_HEADER);
+    for (uint8_t k = 0; k < count && arb_nvm_read(nvm, address, bytes, record->entry); k++) {
+        record->take(table, k, bytes);
+        address = (uint16_t)(address + record->entry);
+    }
+}
+
+/* Puts what fits a page of a copy, from byte copy->written on, and the CRC of all of it. Returns how many
+ * bytes. */
+static uint16_t put_page(const arb_record_t *record, const arb_area_t *newest, uint8_t count,
+                         const void *table, arb_record_copy_t *copy, uint8_t page[ARB_PORT_NVM_PAGE])
+{
+    uint8_t bytes[ARB_RECORD_ENTRY_MAX];
+    uint8_t len = ARB_AREA_HEADER;
+    uint16_t offset = (uint16_t)(0u - copy->written); /* in the page; what is none lies far behind it */
+    copy->crc = ARB_CRC32_INIT;
+    arb_area_put_header(newest, record->letter, count, bytes);
+    for (uint8_t k = 0;; k++) {
+        for (uint8_t i = 0; i < len; i++) {
+            if (offset < ARB_PORT_NVM_PAGE) {
+                page[offset] = bytes[i];
+            }
+            offset++;
+        }
+        if (k > count) {
+            return offset < ARB_PORT_NVM_PAGE ? offset : ARB_PORT_NVM_PAGE;
+        }
+        copy->crc = arb_crc32(copy->crc, bytes, len);
+        if (k < count) {
+            record->put(table, k, bytes);
+            len = record->entry;
+        } else {
+            pdcp_bytes_put_u32(bytes, ~copy->crc);
+            len = ARB_AREA_CRC;
+        }
+    }
+}
+
+bool arb_record_write(const arb_record_t *record, const arb_nvm_t *nvm, const arb_area_t *newest,
+                      uint8_t count, const void *table, arb_record_copy_t *copy)
+{
+    uint8_t page[ARB_PORT_NVM_PAGE];
+    const uint32_t before = copy->crc;
+    const uint16_t len = put_page(record, newest, count, table, copy, page);
+    if (copy->written != 0 && copy->crc != before) {
+        copy->written = 0;
+        return true;
+    }
+    const uint16_t address = (uint16_t)(area_address(record, arb_area_next(newest)) + copy->written);
+    copy->written = (uint16_t)(copy->written + len);
+    return arb_nvm_write(nvm, address, page, len);
+}
+
+void arb_record_written(arb_area_t *newest)
+{
+    newest->sequence++;
+    newest->area = arb_area_next(newest);
+}

@@ -3,8 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "arb_error.h"
 #include "arb_call.h"
+#include "arb_error.h"
 #include "pdcp_time.h"
 
 /* The longest failure answer, 230Fh. */

@@ -1,8 +1,8 @@
 /* Messages 2201h to 230Dh [API 3.3]. */
 #include <string.h>
 
-#include "arb_error.h"
 #include "arb_call.h"
+#include "arb_error.h"
 #include "pdcp_bytes.h"
 #include "pdcp_time.h"
 

@@ -2,8 +2,8 @@
 
 #include <string.h>
 
-#include "arb_error.h"
 #include "arb_call.h"
+#include "arb_error.h"
 #include "arb_version.h"
 #include "pdcp_bytes.h"
 #include "profile_channel.h"

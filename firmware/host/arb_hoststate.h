@@ -1,5 +1,5 @@
-/* The state of the host API, and what it speaks to. Its files work on it together: arb_hostapi.c owns queue and
- * answers, arb_hostbus.c and arb_hostext.c serve the request at the front through arb_call.h. */
+/* The state of the host API, and what it speaks to. Its files work on it together: arb_hostapi.c owns queue
+ * and answers, arb_hostbus.c and arb_hostext.c serve the request at the front through arb_call.h. */
 #ifndef ARB_HOSTSTATE_H
 #define ARB_HOSTSTATE_H
 

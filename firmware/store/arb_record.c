@@ -51,50 +51,62 @@ void arb_record_load(const arb_record_t *record, const arb_nvm_t *nvm, arb_area_
     }
 }
 
-/* Puts what fits a page of a copy, from byte copy->written on, and the CRC of all of it. Returns how many
- * bytes. */
-static uint16_t put_page(const arb_record_t *record, const arb_area_t *newest, uint8_t count,
-                         const void *table, arb_record_copy_t *copy, uint8_t page[ARB_PORT_NVM_PAGE])
+/* A page of a record on its way to the memory. */
+typedef struct {
+    uint16_t from; /* the byte of the record that the page begins with */
+    uint16_t at;   /* bytes of the record so far, in front of the page, in it and behind it */
+    uint32_t crc;  /* of these bytes */
+    uint8_t bytes[ARB_PORT_NVM_PAGE];
+} page_t;
+
+/* The next bytes of the record; the page keeps what falls into it. */
+static void append(page_t *page, const uint8_t *bytes, uint8_t len)
+{
+    page->crc = arb_crc32(page->crc, bytes, len);
+    for (uint8_t i = 0; i < len; i++) {
+        if (page->at >= page->from && page->at - page->from < (uint16_t)ARB_PORT_NVM_PAGE) {
+            page->bytes[page->at - page->from] = bytes[i];
+        }
+        page->at++;
+    }
+}
+
+/* Goes through the whole record. Returns the CRC of what stands in front of its own. */
+static uint32_t fill_page(const arb_record_t *record, const arb_area_t *newest, uint8_t count,
+                          const void *table, page_t *page)
 {
     uint8_t bytes[ARB_RECORD_ENTRY_MAX];
-    uint8_t len = ARB_AREA_HEADER;
-    uint16_t offset = (uint16_t)(0u - copy->written); /* in the page; what is none lies far behind it */
-    copy->crc = ARB_CRC32_INIT;
+    page->at = 0;
+    page->crc = ARB_CRC32_INIT;
     arb_area_put_header(newest, record->letter, count, bytes);
-    for (uint8_t k = 0;; k++) {
-        for (uint8_t i = 0; i < len; i++) {
-            if (offset < ARB_PORT_NVM_PAGE) {
-                page[offset] = bytes[i];
-            }
-            offset++;
-        }
-        if (k > count) {
-            return offset < ARB_PORT_NVM_PAGE ? offset : ARB_PORT_NVM_PAGE;
-        }
-        copy->crc = arb_crc32(copy->crc, bytes, len);
-        if (k < count) {
-            record->put(table, k, bytes);
-            len = record->entry;
-        } else {
-            pdcp_bytes_put_u32(bytes, ~copy->crc);
-            len = ARB_AREA_CRC;
-        }
+    append(page, bytes, ARB_AREA_HEADER);
+    for (uint8_t k = 0; k < count; k++) {
+        record->put(table, k, bytes);
+        append(page, bytes, record->entry);
     }
+    const uint32_t crc = page->crc;
+    pdcp_bytes_put_u32(bytes, ~crc);
+    append(page, bytes, ARB_AREA_CRC);
+    return crc;
 }
 
 bool arb_record_write(const arb_record_t *record, const arb_nvm_t *nvm, const arb_area_t *newest,
                       uint8_t count, const void *table, arb_record_copy_t *copy)
 {
-    uint8_t page[ARB_PORT_NVM_PAGE];
-    const uint32_t before = copy->crc;
-    const uint16_t len = put_page(record, newest, count, table, copy, page);
-    if (copy->written != 0 && copy->crc != before) {
+    page_t page;
+    page.from = copy->written;
+    const uint32_t crc = fill_page(record, newest, count, table, &page);
+    const bool is_changed = copy->written != 0 && copy->crc != crc;
+    copy->crc = crc;
+    if (is_changed) {
         copy->written = 0;
         return true;
     }
+    const uint16_t left = (uint16_t)(page.at - page.from);
+    const uint16_t len = left < ARB_PORT_NVM_PAGE ? left : ARB_PORT_NVM_PAGE;
     const uint16_t address = (uint16_t)(area_address(record, arb_area_next(newest)) + copy->written);
     copy->written = (uint16_t)(copy->written + len);
-    return arb_nvm_write(nvm, address, page, len);
+    return arb_nvm_write(nvm, address, page.bytes, len);
 }
 
 void arb_record_written(arb_area_t *newest)

@@ -1,5 +1,5 @@
-/* A small table that is kept as a whole: a record stands in two areas (arb_area.h), header, count entries, then
- * the CRC-32 over everything before. It is written page by page. */
+/* A small table that is kept as a whole: a record stands in two areas (arb_area.h), header, count entries,
+ * then the CRC-32 over everything before. It is written page by page. */
 #ifndef ARB_RECORD_H
 #define ARB_RECORD_H
 

@@ -11,7 +11,7 @@
 #include "pdcp_nodes.h"
 #include "pdcp_stats.h"
 #include "pdcp_suspend.h"
-#include "pdcp_timer.h"
+#include "pdcp_timers.h"
 #include "pdcp_txq.h"
 #include "pdcp_unknown.h"
 

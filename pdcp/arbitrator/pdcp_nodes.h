@@ -9,6 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
+#include "pdcp_identity.h"
 #include "pdcp_limits.h"
 #include "pdcp_request.h"
 #include "pdcp_spec.h"

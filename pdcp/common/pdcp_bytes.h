@@ -7,7 +7,7 @@
 
 #include <stdint.h>
 
-#include "pdcp_spec.h"
+#include "pdcp_identity.h"
 
 enum { PDCP_BYTES_IDENTITY = 6 }; /* VID, PID, SN */
 

@@ -157,8 +157,3 @@ void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame)
     frame->data[0] = msg->code;
     frame->dlc = (uint8_t)(put_fields(layout_of(msg->code)->fields, msg, &frame->data[1]) - frame->data);
 }
-
-bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b)
-{
-    return a->vid == b->vid && a->pid == b->pid && a->sn == b->sn;
-}

@@ -8,6 +8,7 @@
 #include <stdint.h>
 
 #include "can_frame.h"
+#include "pdcp_identity.h"
 #include "pdcp_spec.h"
 
 /* One message, decoded. Which members mean something depends on code; the others are 0. */
@@ -59,7 +60,5 @@ pdcp_decode_t pdcp_decode(const can_frame_t *frame, pdcp_msg_t *msg);
 /* Builds the frame of a message, with the sizes of [PDCP 3.2]. msg->code must be one of the codes above,
  * msg->len at most what the code's value field holds. */
 void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame);
-
-bool pdcp_identity_equal(const pdcp_identity_t *a, const pdcp_identity_t *b);
 
 #endif

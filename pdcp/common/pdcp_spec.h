@@ -3,8 +3,6 @@
 #ifndef PDCP_SPEC_H
 #define PDCP_SPEC_H
 
-#include <stdint.h>
-
 /* Message priority: bits 10 and 9 of the identifier [PDCP 2.2.1]. Common practice: high for data and beacons,
  * normal for everything else [PROFILE 2.2]. */
 enum { PDCP_PRIORITY_HIGH = 0, PDCP_PRIORITY_NORMAL = 1, PDCP_PRIORITY_LOW = 2, PDCP_PRIORITY_BINDING = 3 };
@@ -126,12 +124,5 @@ enum {
     PDCP_GHOST_MS = 300,    /* one of them that is not heard after its grant is forgotten (D-BUS-43) */
     PDCP_AGE_MAX_MS = 20000 /* longer than any time that is counted from the start */
 };
-
-/* VID, PID and serial number: who a device is [PDCP 3.2.1]. */
-typedef struct {
-    uint16_t vid;
-    uint16_t pid;
-    uint16_t sn;
-} pdcp_identity_t;
 
 #endif

@@ -10,6 +10,7 @@
 #include <stdint.h>
 
 #include "pdcp_device_limits.h"
+#include "pdcp_identity.h"
 #include "pdcp_spec.h"
 #include "pdcp_txq.h"
 

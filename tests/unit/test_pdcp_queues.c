@@ -1,7 +1,7 @@
 /* The deadline heap and the transmit queue, each against the plainest thing that does the same. */
 #include <string.h>
 
-#include "pdcp_timer.h"
+#include "pdcp_timers.h"
 #include "pdcp_txq.h"
 #include "unity.h"
 

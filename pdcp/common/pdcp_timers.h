@@ -1,7 +1,7 @@
 /* Deadlines in a binary heap: the earliest is known at once, and setting or cancelling one costs a walk of at
  * most log2(PDCP_TIMERS_MAX) levels, never a scan of all devices. */
-#ifndef PDCP_TIMER_H
-#define PDCP_TIMER_H
+#ifndef PDCP_TIMERS_H
+#define PDCP_TIMERS_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -10,8 +10,8 @@
 
 /* Two for each device and the arbitrator's own. */
 enum {
-    PDCP_TIMER_REQUEST = 0,             /* + slot: acknowledgement time, pause between attempts */
-    PDCP_TIMER_LIFE = PDCP_DEVICES_MAX, /* + slot: silence of a device, keeping of a lost one */
+    PDCP_TIMER_REQUEST = 0,             /* + place: acknowledgement time, pause between attempts */
+    PDCP_TIMER_LIFE = PDCP_DEVICES_MAX, /* + place: silence of a device, keeping of a lost one */
     PDCP_TIMER_BEACON = 2 * PDCP_DEVICES_MAX,
     PDCP_TIMER_LINK,     /* links that were not answered are tried again */
     PDCP_TIMER_HOST,     /* the host's request or link has waited long enough for its turn */

@@ -1,4 +1,4 @@
-#include "pdcp_timer.h"
+#include "pdcp_timers.h"
 
 #include "pdcp_time.h"
 

@@ -25,6 +25,7 @@
 #include "nvm.h"
 #include "pdcp_device.h"
 #include "pdcp_time.h"
+#include "profile_tree.h"
 #include "profile_type.h"
 #include "sys.h"
 
@@ -44,7 +45,13 @@ enum {
     IN_8 = 0x5200,
     IN_BOOLEAN = 0x7200,
     TERMINAL_8 = 0x5300,
-    TERMINAL_BOOLEAN = 0x7300
+    TERMINAL_BOOLEAN = 0x7300,
+    /* Profiles of the test system that are not in the reference tree: odd components are a vendor's own. */
+    TEST_STICK_X = 0x2120,
+    TEST_MUSCLE = 0x2110,
+    TEST_WRIST = 0x1100,
+    TEST_FINGER = 0x1210,
+    TEST_BAR = 0x1110
 };
 
 #define TEXT(text)                                                                                           \
@@ -55,29 +62,35 @@ enum {
 #if NODE_ROLE == 1
 #define NODE_TEXT "joystick"
 static const pdcp_device_channel_desc_t node_channels[] = {
-    {.direction = PDCP_OUTPUT, .type = OUT_8, .profile = 0x2120, .descriptor = TEXT("stick X")},
-    {.direction = PDCP_OUTPUT, .type = OUT_8, .profile = 0x2A64, .descriptor = TEXT("stick Y")},
-    {.direction = PDCP_OUTPUT, .type = OUT_BOOLEAN, .profile = 0x2A20, .descriptor = TEXT("button")}};
+    {.direction = PDCP_OUTPUT, .type = OUT_8, .profile = TEST_STICK_X, .descriptor = TEXT("stick X")},
+    {.direction = PDCP_OUTPUT,
+     .type = OUT_8,
+     .profile = PROFILE_CONTROL_JOYSTICK_Y,
+     .descriptor = TEXT("stick Y")},
+    {.direction = PDCP_OUTPUT,
+     .type = OUT_BOOLEAN,
+     .profile = PROFILE_CONTROL_BUTTON,
+     .descriptor = TEXT("button")}};
 #elif NODE_ROLE == 2
 #define NODE_TEXT "controller"
 static const uint8_t node_requires_1 = 0x40; /* bit strings, first bit = channel 0 (D-BUS-8) */
 static const uint8_t node_requires_2 = 0x20;
 static const pdcp_device_channel_desc_t node_channels[] = {
-    {.direction = PDCP_INPUT, .type = IN_BOOLEAN, .profile = 0x2200, .descriptor = TEXT("switch")},
-    {.direction = PDCP_INPUT, .type = IN_8, .profile = 0x2110, .descriptor = TEXT("muscle")},
+    {.direction = PDCP_INPUT, .type = IN_BOOLEAN, .profile = PROFILE_EMG, .descriptor = TEXT("switch")},
+    {.direction = PDCP_INPUT, .type = IN_8, .profile = TEST_MUSCLE, .descriptor = TEXT("muscle")},
     {.direction = PDCP_OUTPUT,
      .type = OUT_8,
-     .profile = 0x1100,
+     .profile = TEST_WRIST,
      .descriptor = TEXT("wrist"),
      .required = {&node_requires_2, 1}},
     {.direction = PDCP_OUTPUT,
      .type = OUT_8,
-     .profile = 0x1210,
+     .profile = TEST_FINGER,
      .descriptor = TEXT("finger"),
      .required = {&node_requires_1, 1}},
     {.direction = PDCP_OUTPUT,
      .type = OUT_BOOLEAN,
-     .profile = 0x1220,
+     .profile = PROFILE_GRIP_POWER,
      .descriptor = TEXT("grip"),
      .required = {&node_requires_2, 1}}};
 #else
@@ -85,14 +98,14 @@ static const pdcp_device_channel_desc_t node_channels[] = {
 static const pdcp_device_channel_desc_t node_channels[] = {{.direction = PDCP_INPUT,
                                                             .terminal = true,
                                                             .type = TERMINAL_8,
-                                                            .profile = 0x1110,
-                                                            .terminal_profile = 0x1110,
+                                                            .profile = TEST_BAR,
+                                                            .terminal_profile = TEST_BAR,
                                                             .descriptor = TEXT("bar")},
                                                            {.direction = PDCP_INPUT,
                                                             .terminal = true,
                                                             .type = TERMINAL_BOOLEAN,
-                                                            .profile = 0x1220,
-                                                            .terminal_profile = 0x1220,
+                                                            .profile = PROFILE_GRIP_POWER,
+                                                            .terminal_profile = PROFILE_GRIP_POWER,
                                                             .descriptor = TEXT("LED")}};
 #endif
 
@@ -225,16 +238,34 @@ static void on_safe(void *ctx, uint8_t channel)
     show(self);
 }
 
-/* The value of an output: from the joystick, or the input that it copies, scaled to its type. */
+static int32_t joystick_value(uint8_t channel)
+{
+    switch (channel) {
+    case 1:
+        return adc1_read(BOARD_JOYSTICK_X) >> 2;
+    case 2:
+        return adc1_read(BOARD_JOYSTICK_Y) >> 2;
+    default:
+        return board_button();
+    }
+}
+
+/* The input that an output copies, scaled to its type. */
+static int32_t controller_value(const node_t *self, uint8_t channel)
+{
+    switch (channel) {
+    case 3:
+        return self->values[1];
+    case 4:
+        return self->values[0] != 0 ? 255 : 0;
+    default:
+        return self->values[1] > 127;
+    }
+}
+
 static int32_t output_value(const node_t *self, uint8_t channel)
 {
-    if (NODE_ROLE == JOYSTICK) {
-        return channel == 1   ? adc1_read(BOARD_JOYSTICK_X) >> 2
-               : channel == 2 ? adc1_read(BOARD_JOYSTICK_Y) >> 2
-                              : board_button();
-    }
-    const int32_t switched = self->values[0] != 0 ? 255 : 0;
-    return channel == 3 ? self->values[1] : channel == 4 ? switched : self->values[1] > 127;
+    return NODE_ROLE == JOYSTICK ? joystick_value(channel) : controller_value(self, channel);
 }
 
 static void send_outputs(node_t *self, uint32_t now_ms)

@@ -48,7 +48,8 @@ uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
 uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t number = pdcp_nodes_channel(nodes, call->place[end], call->payload[7 * end + 6]);
+    const uint8_t number =
+        pdcp_nodes_channel(nodes, call->place[end], call->payload[ARB_CHANNEL_BYTES * end + ARB_AT_INDEX]);
     return profile_channel_is_ready(nodes, number, transfer) ? number : PDCP_NONE;
 }
 

@@ -32,7 +32,7 @@ typedef struct {
     uint16_t id;
     unsigned len : 8;     /* of the payload; another one: ARB_ERR_SIZE */
     unsigned longer : 1;  /* or longer */
-    unsigned devices : 2; /* that the payload names, at 0 and 7: their places, or ARB_ERR_DEVICE */
+    unsigned devices : 2; /* whose channels the payload begins with: their places, or ARB_ERR_DEVICE */
     unsigned waits : 1;   /* for the end of a running setup or planner: it changes links (D-API-6) */
     arb_handler_t handler;
 } arb_message_t;

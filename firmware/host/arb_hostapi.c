@@ -10,26 +10,38 @@
 /* The longest failure answer, 230Fh. */
 enum { FAILURE_MAX = ARB_HOST_HEADER + ARB_RESET_RESULTS + ARB_HOST_CRC };
 
-/* [API 3.2], and the extension group: id, size without CRC16, or longer, devices, waits, handler. */
+/* [API 3.2], and the extension group. len: 0 where there is no payload. */
 static const arb_message_t messages[] = {
-    {ARB_MSG_SYSTEM_INFO, 0, 0, 0, 0, arb_hostbus_system_info},
-    {ARB_MSG_DEVICE_INFO, 1, 0, 0, 0, arb_hostbus_device_info},
-    {ARB_MSG_INPUT_INFO, 1, 0, 0, 0, arb_hostbus_input_info},
-    {ARB_MSG_OUTPUT_INFO, 1, 0, 0, 0, arb_hostbus_output_info},
-    {ARB_MSG_LINK_INFO, 1, 0, 0, 0, arb_hostbus_link_info},
-    {ARB_MSG_GET_PARAMETER, 8, 0, 1, 0, arb_hostbus_get_parameter},
-    {ARB_MSG_SET_PARAMETER, 9, 1, 1, 0, arb_hostbus_set_parameter},
-    {ARB_MSG_CONFIGURE_LINK, 14, 0, 2, 1, arb_hostbus_configure_link},
-    {ARB_MSG_PASSTHROUGH, 15, 0, 0, 0, arb_hostbus_passthrough},
-    {ARB_MSG_RESET, 1, 0, 0, 0, arb_hostbus_reset},
-    {ARB_MSG_ARBITRATOR_INFO, 0, 0, 0, 0, arb_hostext_arbitrator_info},
-    {ARB_MSG_SET_FLAGS, 1, 0, 0, 0, arb_hostext_set_flags},
-    {ARB_MSG_ACTION, 2, 0, 0, 1, arb_hostext_action},
-    {ARB_MSG_READ_CONFIGS, 3, 0, 0, 0, arb_hostext_read_configs},
-    {ARB_MSG_WRITE_CONFIGS, 5, 1, 0, 0, arb_hostext_write_configs},
-    {ARB_MSG_REMOVE_LINK, 7, 0, 1, 1, arb_hostext_remove_link},
-    {ARB_MSG_STATISTICS, 1, 0, 0, 0, arb_hostext_statistics},
-    {ARB_MSG_EVENT_STREAM, 1, 1, 0, 0, arb_hostext_event_stream},
+    {.id = ARB_MSG_SYSTEM_INFO, .handler = arb_hostbus_system_info},
+    {.id = ARB_MSG_DEVICE_INFO, .len = 1, .handler = arb_hostbus_device_info},
+    {.id = ARB_MSG_INPUT_INFO, .len = 1, .handler = arb_hostbus_input_info},
+    {.id = ARB_MSG_OUTPUT_INFO, .len = 1, .handler = arb_hostbus_output_info},
+    {.id = ARB_MSG_LINK_INFO, .len = 1, .handler = arb_hostbus_link_info},
+    {.id = ARB_MSG_GET_PARAMETER, .len = ARB_AT_VALUE, .devices = 1, .handler = arb_hostbus_get_parameter},
+    {.id = ARB_MSG_SET_PARAMETER,
+     .len = ARB_AT_VALUE + 1,
+     .longer = 1,
+     .devices = 1,
+     .handler = arb_hostbus_set_parameter},
+    {.id = ARB_MSG_CONFIGURE_LINK,
+     .len = 2 * ARB_CHANNEL_BYTES,
+     .devices = 2,
+     .waits = 1,
+     .handler = arb_hostbus_configure_link},
+    {.id = ARB_MSG_PASSTHROUGH, .len = ARB_AT_DATA + CAN_FRAME_DATA_MAX, .handler = arb_hostbus_passthrough},
+    {.id = ARB_MSG_RESET, .len = 1, .handler = arb_hostbus_reset},
+    {.id = ARB_MSG_ARBITRATOR_INFO, .handler = arb_hostext_arbitrator_info},
+    {.id = ARB_MSG_SET_FLAGS, .len = 1, .handler = arb_hostext_set_flags},
+    {.id = ARB_MSG_ACTION, .len = 2, .waits = 1, .handler = arb_hostext_action},
+    {.id = ARB_MSG_READ_CONFIGS, .len = ARB_AT_LENGTH + 1, .handler = arb_hostext_read_configs},
+    {.id = ARB_MSG_WRITE_CONFIGS, .len = ARB_AT_PIECE + 1, .longer = 1, .handler = arb_hostext_write_configs},
+    {.id = ARB_MSG_REMOVE_LINK,
+     .len = ARB_CHANNEL_BYTES,
+     .devices = 1,
+     .waits = 1,
+     .handler = arb_hostext_remove_link},
+    {.id = ARB_MSG_STATISTICS, .len = 1, .handler = arb_hostext_statistics},
+    {.id = ARB_MSG_EVENT_STREAM, .len = 1, .longer = 1, .handler = arb_hostext_event_stream},
 };
 
 /* NULL: there is no message with this id. */
@@ -136,7 +148,7 @@ static void drop_front(arb_hostapi_t *api)
 static uint8_t check_arguments(arb_call_t *call, const arb_message_t *message)
 {
     const uint8_t *bytes = call->payload;
-    for (uint8_t i = 0; i < message->devices; i++, bytes += 7) {
+    for (uint8_t i = 0; i < message->devices; i++, bytes += ARB_CHANNEL_BYTES) {
         call->place[i] = arb_call_device(call, bytes);
         if (call->place[i] == PDCP_NONE) {
             return ARB_ERR_DEVICE;

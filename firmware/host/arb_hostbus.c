@@ -6,7 +6,7 @@
 #include "pdcp_bytes.h"
 #include "pdcp_time.h"
 
-enum { PASSTHROUGH = 15 }; /* bytes of the payload: dev, DLC, data */
+enum { PASSTHROUGH = ARB_AT_DATA + CAN_FRAME_DATA_MAX }; /* bytes of the payload */
 
 /* 2201h: number of devices, inputs, outputs, links [API 3.3.2]. */
 uint8_t arb_hostbus_system_info(arb_call_t *call)
@@ -25,9 +25,9 @@ static void put_info(arb_call_t *call, const pdcp_identity_t *identity, uint8_t 
                      uint16_t profile)
 {
     arb_hostcodec_put_channel(&call->answer[0], identity, index);
-    pdcp_bytes_put_u16(&call->answer[7], type);
-    pdcp_bytes_put_u16(&call->answer[9], profile);
-    call->answer_len = 11;
+    pdcp_bytes_put_u16(&call->answer[ARB_CHANNEL_BYTES], type);
+    pdcp_bytes_put_u16(&call->answer[ARB_CHANNEL_BYTES + 2], profile);
+    call->answer_len = ARB_INFO_BYTES;
 }
 
 /* 2204h [API 3.3.5] */
@@ -76,7 +76,7 @@ uint8_t arb_hostbus_link_info(arb_call_t *call)
         return ARB_ERR_NUMBER;
     }
     arb_hostcodec_put_link(call->answer, nodes, &nodes->channels[number]);
-    call->answer_len = 15;
+    call->answer_len = ARB_LINK_BYTES;
     return ARB_OK;
 }
 
@@ -105,8 +105,8 @@ static uint8_t parameter(arb_call_t *call, bool set)
         return arb_call_outcome(call);
     }
     const uint8_t place = call->place[0];
-    const uint8_t channel = call->payload[6];
-    const uint8_t param = call->payload[7];
+    const uint8_t channel = call->payload[ARB_AT_INDEX];
+    const uint8_t param = call->payload[ARB_AT_PARAM];
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
     if (channel != 0 && nodes->nodes[place].state == PDCP_NODE_READY &&
         pdcp_nodes_channel(nodes, place, channel) == PDCP_NONE) {
@@ -116,7 +116,8 @@ static uint8_t parameter(arb_call_t *call, bool set)
         return ARB_ERR_NOT_SUPPORTED;
     }
     const pdcp_status_t status =
-        set ? pdcp_arb_set(call->arb, place, channel, param, &call->payload[8], (uint16_t)(call->len - 8))
+        set ? pdcp_arb_set(call->arb, place, channel, param, &call->payload[ARB_AT_VALUE],
+                           (uint16_t)(call->len - ARB_AT_VALUE))
             : pdcp_arb_get(call->arb, place, channel, param, call->answer, PDCP_PARAMETER_MAX);
     return status == PDCP_OK ? arb_call_started(call) : ARB_ERR_BUSY;
 }
@@ -136,7 +137,7 @@ uint8_t arb_hostbus_set_parameter(arb_call_t *call)
 static uint8_t error_of_ends(const arb_call_t *call)
 {
     const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], call->payload[6]);
+    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], call->payload[ARB_AT_INDEX]);
     if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT &&
         nodes->channels[number].node_id == 0) {
         return ARB_ERR_NO_NODE_ID;
@@ -208,20 +209,20 @@ static bool may_pass(uint8_t code)
 /* 230Ah: dev, DLC, 8 data bytes [API 3.3.26]. Once started, the bus speaks through PDCP_EVENT_REQUEST. */
 uint8_t arb_hostbus_passthrough(arb_call_t *call)
 {
-    static const uint8_t all[6];
+    static const uint8_t all[PDCP_BYTES_IDENTITY];
     if (call->api->turn.started) {
         const uint8_t error = arb_call_outcome(call);
         if (error == ARB_PENDING) {
             return error; /* what is to be sent stands in the answer */
         }
-        call->answer[6] = (uint8_t)call->answer_len;
-        memset(&call->answer[7 + call->answer_len], 0, 8u - call->answer_len);
+        call->answer[ARB_AT_DLC] = (uint8_t)call->answer_len;
+        memset(&call->answer[ARB_AT_DATA + call->answer_len], 0, CAN_FRAME_DATA_MAX - call->answer_len);
         call->answer_len = PASSTHROUGH;
         return error;
     }
-    const uint8_t dlc = call->payload[6];
-    const uint8_t *data = &call->payload[7];
-    if (dlc == 0 || dlc > 8) {
+    const uint8_t dlc = call->payload[ARB_AT_DLC];
+    const uint8_t *data = &call->payload[ARB_AT_DATA];
+    if (dlc == 0 || dlc > CAN_FRAME_DATA_MAX) {
         return ARB_ERR_SIZE;
     }
     memcpy(call->answer, call->payload, PASSTHROUGH);
@@ -236,7 +237,8 @@ uint8_t arb_hostbus_passthrough(arb_call_t *call)
         (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, data[2], data[1]))) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    const pdcp_status_t status = pdcp_arb_passthrough(call->arb, call->place[0], &call->answer[7], dlc);
+    const pdcp_status_t status =
+        pdcp_arb_passthrough(call->arb, call->place[0], &call->answer[ARB_AT_DATA], dlc);
     return status == PDCP_OK ? arb_call_started(call) : (uint8_t)ARB_ERR_BUSY;
 }
 

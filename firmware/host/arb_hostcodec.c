@@ -59,15 +59,17 @@ uint16_t arb_hostcodec_finish(uint8_t *frame, uint16_t id, uint8_t reference, ui
     return (uint16_t)(ARB_HOST_HEADER + size);
 }
 
-void arb_hostcodec_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index)
+void arb_hostcodec_put_channel(uint8_t bytes[ARB_CHANNEL_BYTES], const pdcp_identity_t *identity,
+                               uint8_t index)
 {
     pdcp_bytes_put_identity(bytes, identity);
-    bytes[6] = index;
+    bytes[ARB_AT_INDEX] = index;
 }
 
-void arb_hostcodec_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input)
+void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_nodes_t *nodes,
+                            const pdcp_channel_t *input)
 {
     arb_hostcodec_put_channel(&bytes[0], &input->source, input->source_index);
-    arb_hostcodec_put_channel(&bytes[7], &nodes->nodes[input->node].identity, input->index);
-    bytes[14] = input->link;
+    arb_hostcodec_put_channel(&bytes[ARB_CHANNEL_BYTES], &nodes->nodes[input->node].identity, input->index);
+    bytes[ARB_LINK_BYTES - 1] = input->link;
 }

@@ -20,6 +20,25 @@ enum {
     ARB_HOST_CRC = 2     /* bytes */
 };
 
+/* Fields that messages are made of. */
+enum {
+    ARB_CHANNEL_BYTES = 7,                      /* identity of the device, channel index */
+    ARB_LINK_BYTES = 2 * ARB_CHANNEL_BYTES + 1, /* output, input, status */
+    ARB_INFO_BYTES = ARB_CHANNEL_BYTES + 4      /* device or channel, type, profile */
+};
+
+/* Where fields begin in a payload. */
+enum {
+    ARB_AT_INDEX = 6, /* channel index, behind the identity that a payload begins with */
+    ARB_AT_PARAM = 7, /* 2301h, 2304h */
+    ARB_AT_VALUE = 8,
+    ARB_AT_DLC = 6, /* 230Ah and its answer, behind the identity */
+    ARB_AT_DATA = 7,
+    ARB_AT_OFFSET = 0, /* 240Ah, 240Dh */
+    ARB_AT_LENGTH = 2, /* 240Ah: of what is read, 8 bits; 240Dh: of the whole string, 16 bits */
+    ARB_AT_PIECE = 4   /* 240Dh, and the answer to 240Ah */
+};
+
 /* Request ids; the success answer is id + 1, the failure answer id + 2 [API 3.2]. */
 enum {
     ARB_MSG_UNKNOWN_ID = 0x2200, /* answer to an id that does not exist */
@@ -62,9 +81,11 @@ uint16_t arb_hostcodec_crc16(const uint8_t *payload, uint16_t len);
 uint16_t arb_hostcodec_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len);
 
 /* A channel as messages name it: the identity of its device, its index. */
-void arb_hostcodec_put_channel(uint8_t bytes[7], const pdcp_identity_t *identity, uint8_t index);
+void arb_hostcodec_put_channel(uint8_t bytes[ARB_CHANNEL_BYTES], const pdcp_identity_t *identity,
+                               uint8_t index);
 
 /* The link of an input as 220Eh and its event tell of it: output, input, status. */
-void arb_hostcodec_put_link(uint8_t bytes[15], const pdcp_nodes_t *nodes, const pdcp_channel_t *input);
+void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_nodes_t *nodes,
+                            const pdcp_channel_t *input);
 
 #endif

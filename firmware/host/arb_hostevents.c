@@ -48,8 +48,8 @@ static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t
                        const pdcp_event_t *event)
 {
     const pdcp_node_t *node = &arb->bus.nodes.nodes[event->node];
-    uint8_t *data =
-        put(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST, 7);
+    uint8_t *data = put(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST,
+                        ARB_CHANNEL_BYTES);
     if (data != NULL) {
         arb_hostcodec_put_channel(data, &node->identity, node->node_id);
     }
@@ -94,10 +94,10 @@ static void put_audit(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t 
 {
     const pdcp_nodes_t *nodes = &arb->bus.nodes;
     const pdcp_channel_t *channel = &nodes->channels[event->channel];
-    uint8_t *data = put(events, now_ms, ARB_EVENT_AUDIT, 8);
+    uint8_t *data = put(events, now_ms, ARB_EVENT_AUDIT, ARB_CHANNEL_BYTES + 1);
     if (data != NULL) {
         arb_hostcodec_put_channel(data, &nodes->nodes[channel->node].identity, channel->index);
-        data[7] = (uint8_t)event->status;
+        data[ARB_CHANNEL_BYTES] = (uint8_t)event->status;
     }
 }
 

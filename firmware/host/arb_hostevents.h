@@ -29,8 +29,8 @@ typedef enum {
 typedef enum { ARB_BUS_ACTIVE = 0, ARB_BUS_PASSIVE = 1, ARB_BUS_OFF = 2, ARB_BUS_SILENT = 3 } arb_bus_state_t;
 
 enum {
-    ARB_EVENT_HEAD = 5,     /* kind8, time32 */
-    ARB_EVENT_DATA_MAX = 15 /* a link */
+    ARB_EVENT_HEAD = 5, /* kind8, time32 */
+    ARB_EVENT_DATA_MAX = ARB_LINK_BYTES
 };
 
 typedef struct {

@@ -78,15 +78,15 @@ uint8_t arb_hostext_read_configs(arb_call_t *call)
 {
     arb_turn_t *turn = &call->api->turn;
     arb_config_t *config = &call->env->limb->config;
-    const uint16_t offset = pdcp_bytes_get_u16(&call->payload[0]);
-    const uint8_t len = call->payload[2];
+    const uint16_t offset = pdcp_bytes_get_u16(&call->payload[ARB_AT_OFFSET]);
+    const uint8_t len = call->payload[ARB_AT_LENGTH];
     uint8_t piece = (uint8_t)(len - turn->value_len);
     if (len > ARB_CONFIG_RAW_MAX) {
         return ARB_ERR_VALUE;
     }
     const arb_config_status_t status =
         arb_config_read_raw(config, call->env->nvm, (uint16_t)(offset + turn->value_len),
-                            &call->answer[4 + turn->value_len], &piece);
+                            &call->answer[ARB_AT_PIECE + turn->value_len], &piece);
     if (status == ARB_CONFIG_ERR_BUSY && turn->value_len != 0) { /* it may become another string */
         turn->value_len = 0;
         turn->since_ms = call->now_ms;
@@ -101,7 +101,7 @@ uint8_t arb_hostext_read_configs(arb_call_t *call)
     }
     pdcp_bytes_put_u16(&call->answer[0], arb_config_length(config));
     pdcp_bytes_put_u16(&call->answer[2], offset);
-    call->answer_len = (uint16_t)(4 + turn->value_len);
+    call->answer_len = (uint16_t)(ARB_AT_PIECE + turn->value_len);
     return ARB_OK;
 }
 
@@ -111,12 +111,12 @@ uint8_t arb_hostext_write_configs(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
     arb_config_t *config = &limb->config;
-    const uint16_t offset = pdcp_bytes_get_u16(&call->payload[0]);
-    const uint16_t total = pdcp_bytes_get_u16(&call->payload[2]);
-    const uint16_t len = (uint16_t)(call->len - 4);
+    const uint16_t offset = pdcp_bytes_get_u16(&call->payload[ARB_AT_OFFSET]);
+    const uint16_t total = pdcp_bytes_get_u16(&call->payload[ARB_AT_LENGTH]);
+    const uint16_t len = (uint16_t)(call->len - ARB_AT_PIECE);
     if (!call->api->turn.started) {
         const arb_config_status_t status =
-            arb_config_write_raw(config, offset, total, &call->payload[4], len);
+            arb_config_write_raw(config, offset, total, &call->payload[ARB_AT_PIECE], len);
         return status == ARB_CONFIG_OK ? arb_call_started(call) : error_of_config(call, (int8_t)status);
     }
     if (config->raw_status == ARB_CONFIG_ERR_BUSY) {
@@ -164,6 +164,23 @@ static void put_counters(arb_call_t *call, const uint32_t *values, uint8_t count
     }
 }
 
+/* Group 1 has the requests in front of what hostrx counts, those that failed behind it: an enumeration in
+ * another order, or with one more, does not compile. */
+typedef char arb_hostext_group_1[ARB_HOSTAPI_RECEIVED == 0 && ARB_HOSTAPI_SENT == 1 &&
+                                         ARB_HOSTAPI_REQUESTS == 2 && ARB_HOSTAPI_BUSY == 3 &&
+                                         ARB_HOSTAPI_UNKNOWN == 4 && ARB_HOSTAPI_COUNTERS == 5
+                                     ? 1
+                                     : -1];
+
+static void put_host_counters(arb_call_t *call)
+{
+    const arb_hostapi_t *api = call->api;
+    put_counters(call, &api->counters[ARB_HOSTAPI_RECEIVED], ARB_HOSTAPI_BUSY - ARB_HOSTAPI_RECEIVED);
+    put_counters(call, api->rx.counters, ARB_HOSTRX_COUNTERS);
+    put_counters(call, &api->counters[ARB_HOSTAPI_BUSY], ARB_HOSTAPI_COUNTERS - ARB_HOSTAPI_BUSY);
+    put_counters(call, api->events.counters, 1 + ARB_EVENT_KINDS);
+}
+
 static void put_driver_counters(arb_call_t *call)
 {
     const arb_port_t *port = call->env->port;
@@ -186,7 +203,6 @@ static void put_storage_counters(arb_call_t *call)
 /* 2413h: group. */
 uint8_t arb_hostext_statistics(arb_call_t *call)
 {
-    const arb_hostapi_t *api = call->api;
     call->answer[0] = call->payload[0];
     call->answer_len = 1;
     switch (call->payload[0]) {
@@ -194,10 +210,7 @@ uint8_t arb_hostext_statistics(arb_call_t *call)
         put_counters(call, call->arb->bus.stats, PDCP_STAT_COUNT);
         return ARB_OK;
     case ARB_STATS_HOST:
-        put_counters(call, &api->counters[ARB_HOSTAPI_RECEIVED], 3);
-        put_counters(call, api->rx.counters, ARB_HOSTRX_COUNTERS);
-        put_counters(call, &api->counters[ARB_HOSTAPI_BUSY], 2);
-        put_counters(call, api->events.counters, 1 + ARB_EVENT_KINDS);
+        put_host_counters(call);
         return ARB_OK;
     case ARB_STATS_STORAGE:
         put_storage_counters(call);

@@ -28,7 +28,7 @@ typedef enum {
     ARB_HOSTRX_COUNTERS
 } arb_hostrx_counter_t;
 
-/* All zero at first. */
+/* All 0 at first; it has no init of its own. */
 typedef struct {
     uint16_t len;
     bool overdue;     /* 100 ms without a byte: what is doubtful is decided now */

@@ -57,7 +57,7 @@ typedef enum {
     ARB_HOSTAPI_COUNTERS
 } arb_hostapi_counter_t;
 
-/* All zero at first. Small state stands first, as in pdcp_bus.h. */
+/* All 0 at first; it has no init of its own. Small state stands first, as in pdcp_bus.h. */
 typedef struct {
     arb_turn_t turn;
     arb_hostrx_request_t held[ARB_HELD_MAX]; /* in the order in which they came */

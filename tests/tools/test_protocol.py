@@ -22,7 +22,12 @@ TEXT = (ROOT / PLACE).read_text(encoding="utf-8")
 HEADERS = {
     "pdcp_spec.h": (),
     "pdcp_stats.h": ("PDCP_STAT_COUNT",),
-    "arb_hostcodec.h": (),
+    "arb_error.h": (),
+    # Sizes and places of fields: the table has them as the fields of messages.
+    "arb_hostcodec.h": (
+        *("ARB_CHANNEL_BYTES", "ARB_LINK_BYTES", "ARB_INFO_BYTES", "ARB_AT_INDEX", "ARB_AT_PARAM", "ARB_AT_VALUE"),
+        *("ARB_AT_DLC", "ARB_AT_DATA", "ARB_AT_OFFSET", "ARB_AT_LENGTH", "ARB_AT_PIECE"),
+    ),
     "profile_tree.h": (),
 }
 

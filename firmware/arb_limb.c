@@ -42,6 +42,7 @@ static void apply_flags(arb_limb_t *limb, uint8_t flags)
 void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
                    uint8_t flags_off, uint32_t now_ms)
 {
+    memset(limb, 0, sizeof *limb);
     limb->told = true;
     profile_run_init(&limb->run, nodes, now_ms);
     arb_flags_load(&limb->flags, nvm);

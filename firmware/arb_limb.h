@@ -52,7 +52,7 @@ typedef struct {
 } arb_limb_t;
 
 /* flags_on and flags_off override what is stored. nodes: the arbitrator's tables; they must outlive
- * limb. limb is all zero before. Reads the memory: may block for as long as that takes. */
+ * limb. Reads the memory: may block for as long as that takes. */
 void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
                    uint8_t flags_off, uint32_t now_ms);
 

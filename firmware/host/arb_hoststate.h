@@ -33,11 +33,10 @@ typedef struct {
 
 /* How far the request at the front has come, when it cannot be answered at once. */
 typedef struct {
-    bool waiting;  /* the handler was called, first at since_ms, and is to be called at until_ms at the latest
-                    */
-    bool started;  /* the bus works on it */
-    bool ended;    /* the bus has spoken: status, value_len */
-    int8_t status; /* pdcp_status_t */
+    bool waiting;    /* the handler was called first at since_ms; it is called again by until_ms */
+    bool started;    /* the bus works on it */
+    bool ended;      /* the bus has spoken: status, value_len */
+    int8_t status;   /* pdcp_status_t */
     uint8_t channel; /* 2410h: number of the input */
     uint8_t open;    /* 230Dh: devices whose reset has not ended */
     uint16_t value_len;

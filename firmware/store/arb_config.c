@@ -259,8 +259,7 @@ arb_config_status_t arb_config_read_raw(const arb_config_t *config, const arb_nv
 
 /* The new string ---------------------------------------------------------------------------------------- */
 
-/* Bytes at to at + len of the new string, or the first of them. Returns how many; 0: the memory has failed.
- */
+/* Writes bytes of the new string from at on, len at most. Returns how many; 0: the memory has failed. */
 static uint16_t put_run(const arb_config_t *config, const arb_nvm_t *nvm, uint16_t at, uint8_t *bytes,
                         uint16_t len)
 {

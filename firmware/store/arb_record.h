@@ -32,9 +32,8 @@ static inline uint16_t arb_record_length(const arb_record_t *record, uint8_t cou
     return (uint16_t)(ARB_AREA_HEADER + record->entry * count + ARB_AREA_CRC);
 }
 
-/* Finds the newest good copy, hands its entries to take, and counts the areas that are neither empty nor
- * good.
- */
+/* Finds the newest good copy, hands its entries to take, and counts in damaged the areas that are neither
+ * empty nor good. */
 void arb_record_load(const arb_record_t *record, const arb_nvm_t *nvm, arb_area_t *newest, uint8_t *damaged,
                      void *table);
 

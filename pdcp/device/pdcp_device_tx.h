@@ -12,8 +12,7 @@
 
 /* --- for the application --- */
 
-/* The frame that is to leave next: lowest identifier first, oldest first among equals. False: there is none.
- */
+/* The frame that is to leave next: lowest identifier first, oldest first among equals. False: none is. */
 bool pdcp_device_tx_peek(const pdcp_device_t *dev, can_frame_t *frame);
 
 /* Removes the frame that pdcp_device_tx_peek showed. Nothing else may be called between the two. */

@@ -61,10 +61,10 @@ void profile_board_set_source(profile_board_t *board, uint8_t input, uint8_t out
         return;
     }
     if (old != PDCP_NONE && profile_board_rival_of(board, input, old) == PDCP_NONE) {
-        pdcp_set_bit(board->taken, old, false);
+        pdcp_bit_set(board->taken, old, false);
     }
     if (output != PDCP_NONE) {
-        pdcp_set_bit(board->taken, output, true);
+        pdcp_bit_set(board->taken, output, true);
     }
 }
 

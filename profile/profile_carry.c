@@ -41,7 +41,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
         }
     }
     if (!original) {
-        pdcp_set_bit(run->dropping, input, true);
+        pdcp_bit_set(run->dropping, input, true);
         (void)pdcp_arb_disconnect(arb, input);
     }
 }

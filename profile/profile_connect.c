@@ -93,7 +93,7 @@ static void descend(profile_board_t *board, uint8_t need)
     const profile_frame_t *top = &board->connect.top;
     put_frame(board, board->connect.depth, (unsigned)(top->source << 2 | top->need));
     board->connect.depth++;
-    pdcp_set_bit(board->below.open, top->mark, true);
+    pdcp_bit_set(board->below.open, top->mark, true);
     push(board, need, PROFILE_SOURCE_ORIGINAL);
 }
 
@@ -110,7 +110,7 @@ static void ascend(profile_board_t *board)
     do {
         top->mark--;
     } while (!pdcp_bit(board->below.open, top->mark));
-    pdcp_set_bit(board->below.open, top->mark, false);
+    pdcp_bit_set(board->below.open, top->mark, false);
     top->cursor = top->input;
     top->input = board->log[top->mark];
     top->tried = board->want[top->input];

@@ -11,10 +11,10 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
     const bool urgent = run->urgent;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
         if (run->scene.nodes->channels[i].node == node) {
-            pdcp_set_bit(run->dropping, i, false);
+            pdcp_bit_set(run->dropping, i, false);
         }
     }
-    pdcp_set_bit(run->scene.awaited, node, false);
+    pdcp_bit_set(run->scene.awaited, node, false);
     if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
         profile_active_read_back(run, node);
     }
@@ -29,7 +29,7 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
 static void on_reset(profile_run_t *run, uint32_t now_ms, const pdcp_event_t *event)
 {
     if (event->status == PDCP_OK) {
-        pdcp_set_bit(run->scene.awaited, event->node, true);
+        pdcp_bit_set(run->scene.awaited, event->node, true);
         run->awaited_ms = now_ms + PROFILE_RESET_MS;
     }
 }
@@ -68,7 +68,7 @@ static void on_request_end(profile_run_t *run, uint32_t now_ms, pdcp_status_t st
     run->requesting = false;
     if (status == PDCP_OK) {
         run->tries = 0;
-        pdcp_set_bit(run->scene.made, run->request.input, true);
+        pdcp_bit_set(run->scene.made, run->request.input, true);
         run->moves++;
         return;
     }
@@ -109,7 +109,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
         (void)profile_active_adopt(run, input, false);
     }
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
-        pdcp_set_bit(run->scene.made, input, profile_channel_breaks_sole_access(nodes, channel->feed, input));
+        pdcp_bit_set(run->scene.made, input, profile_channel_breaks_sole_access(nodes, channel->feed, input));
         profile_run_make_due(run, run->at_events);
     }
 }
@@ -154,7 +154,7 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     const uint8_t entry = profile_active_entry_of(run, input);
     const bool dropping = pdcp_bit(run->dropping, input);
     if (link == PDCP_LINK_NONE) {
-        pdcp_set_bit(run->dropping, input, false);
+        pdcp_bit_set(run->dropping, input, false);
     }
     if (dropping) {
         return;

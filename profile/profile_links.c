@@ -35,7 +35,7 @@ static uint8_t take_part(profile_links_t *links, uint8_t *used, const pdcp_ident
     }
     if (unused != NULL) {
         unused->identity = *owner;
-        pdcp_set_bit(used, part, true);
+        pdcp_bit_set(used, part, true);
     }
     return part;
 }
@@ -73,8 +73,8 @@ bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool 
     const profile_entry_t *at = links->entries;
     for (uint8_t i = 0; i < links->count; i++, at++) {
         if (i != old) {
-            pdcp_set_bit(used, at->output.part, true);
-            pdcp_set_bit(used, at->input.part, true);
+            pdcp_bit_set(used, at->output.part, true);
+            pdcp_bit_set(used, at->input.part, true);
         }
     }
     /* If only the second end finds no part, the first one got that of its device in the old entry, or one

@@ -186,7 +186,7 @@ void profile_plan_begin(profile_board_t *board, const profile_scene_t *scene, ui
     memset(board->want, PDCP_NONE, sizeof board->want);
     board->plan.what = what | ALWAYS;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        pdcp_set_bit(board->plan.ready, i, is_ready(scene, i));
+        pdcp_bit_set(board->plan.ready, i, is_ready(scene, i));
     }
     for (uint8_t e = 0; e < scene->links->count; e++) {
         board->stand_in[e] = scene->links->entries[e].stand_in;

@@ -38,7 +38,7 @@ static void leave_unwanted(profile_run_t *run)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t source = profile_channel_source(run->scene.nodes, i);
         if (source != PDCP_NONE && source != run->plan.want[i]) {
-            pdcp_set_bit(run->scene.made, i, true);
+            pdcp_bit_set(run->scene.made, i, true);
         }
     }
 }
@@ -63,7 +63,7 @@ static void forget_working(profile_run_t *run)
         const profile_entry_t *entry = &run->links.entries[e];
         const uint8_t input = profile_links_channel(&run->links, run->scene.nodes, &entry->input, PDCP_INPUT);
         if (entry->by_host && input != PDCP_NONE) {
-            pdcp_set_bit(run->scene.made, input, false);
+            pdcp_bit_set(run->scene.made, input, false);
         }
     }
 }

@@ -41,7 +41,7 @@ void profile_settle_mark(profile_board_t *board)
 {
     const uint8_t input = board->settle.at;
     if (is_lacking(board, input)) {
-        pdcp_set_bit(board->scratch.marks.gone, input, true);
+        pdcp_bit_set(board->scratch.marks.gone, input, true);
         board->changed = true;
         if (input == board->input ||
             (!pdcp_bit(board->scratch.marks.lacking, input) && original_of(board, input) != PDCP_NONE)) {
@@ -79,7 +79,7 @@ profile_phase_t profile_settle_enforce(profile_board_t *board)
     if (rival != PDCP_NONE) {
         const uint8_t last = profile_match_is_before(board->nodes, rival, board->at) ? board->at : rival;
         profile_board_set_source(board, last, PDCP_NONE);
-        pdcp_set_bit(board->scratch.marks.gone, last, true);
+        pdcp_bit_set(board->scratch.marks.gone, last, true);
         return PROFILE_PHASE_ENFORCE;
     }
     profile_board_go_to_next(board, PDCP_CHANNELS_MAX);

@@ -37,8 +37,8 @@ bool profile_tlv_names(const uint8_t names[PROFILE_TLV_NAMES_BYTES], const pdcp_
 static void end_link(profile_tlv_t *reader)
 {
     if ((reader->state & TLV_LINK) != 0) {
-        pdcp_set_bit(reader->names, name_of(&reader->link.input.owner), true);
-        pdcp_set_bit(reader->names, name_of(&reader->link.output.owner), true);
+        pdcp_bit_set(reader->names, name_of(&reader->link.input.owner), true);
+        pdcp_bit_set(reader->names, name_of(&reader->link.output.owner), true);
         if (reader->on_link != NULL) {
             reader->on_link(reader->ctx, reader->number, &reader->link);
         }
@@ -75,7 +75,7 @@ static profile_tlv_status_t take_number(uint8_t taken[PROFILE_TLV_SET_BYTES], ui
     if (profile_tlv_has(taken, (uint8_t)number)) {
         return PROFILE_TLV_ERR_TWICE;
     }
-    pdcp_set_bit(taken, (uint8_t)number, true);
+    pdcp_bit_set(taken, (uint8_t)number, true);
     return PROFILE_TLV_MORE;
 }
 

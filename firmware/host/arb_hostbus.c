@@ -247,7 +247,7 @@ static void start_resets(arb_call_t *call, uint8_t first, uint8_t last)
     arb_turn_t *turn = &call->api->turn;
     for (uint8_t number = first; number <= last; number++) {
         const uint8_t place = pdcp_nodes_nth_device(&call->arb->bus.nodes, number);
-        pdcp_set_bit(turn->asked, place, true);
+        pdcp_bit_set(turn->asked, place, true);
         turn->open++;
         (void)pdcp_arb_reset(call->arb, call->now_ms, place);
     }
@@ -263,7 +263,7 @@ static void put_results(arb_call_t *call)
     call->answer_len = ARB_RESET_RESULTS;
     for (uint8_t place = 0; place < PDCP_DEVICES_MAX; place++) {
         if (pdcp_bit(turn->asked, place)) {
-            pdcp_set_bit(call->answer, number, pdcp_bit(turn->reset, place));
+            pdcp_bit_set(call->answer, number, pdcp_bit(turn->reset, place));
             number++;
         }
     }
@@ -311,7 +311,7 @@ void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event)
         turn->status = event->status;
     } else if (event->kind == PDCP_EVENT_RESET) {
         turn->open--;
-        pdcp_set_bit(turn->reset, event->node, event->status == PDCP_OK);
+        pdcp_bit_set(turn->reset, event->node, event->status == PDCP_OK);
     } else if (event->kind == PDCP_EVENT_SILENT) {
         turn->open = 0; /* all devices are forgotten */
     }

@@ -297,7 +297,7 @@ static void on_held(pdcp_arb_t *arb, uint8_t place)
 static void on_bind_frame(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
-    const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
+    const pdcp_decode_t decoded = pdcp_codec_decode(frame, &msg);
     if (msg.code != PDCP_BIND_DEVICE) {
         count(arb, PDCP_STAT_DROP_BINDING);
         return;
@@ -451,7 +451,7 @@ static void on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame)
         return;
     }
     count(arb, PDCP_STAT_DROP_ARBITRATOR);
-    if (pdcp_decode(frame, &msg) == PDCP_DECODE_OK && msg.code == (PDCP_BIND_DEVICE | PDCP_ANSWER)) {
+    if (pdcp_codec_decode(frame, &msg) == PDCP_DECODE_OK && msg.code == (PDCP_BIND_DEVICE | PDCP_ANSWER)) {
         on_foreign_grant(arb, &msg.identity);
     } else {
         pdcp_standby_on_request(&arb->standby, frame);
@@ -697,7 +697,7 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
     on_foreign_answer(arb, frame);
     bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
     if (!replied) {
-        const pdcp_decode_t decoded = pdcp_decode(frame, &msg);
+        const pdcp_decode_t decoded = pdcp_codec_decode(frame, &msg);
         if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
             count(arb, PDCP_STAT_DROP_BAD_CODE);
         } else if (decoded == PDCP_DECODE_BAD_DLC) {

@@ -34,7 +34,7 @@ void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node)
     for (unsigned at = 0; at < WALK_END; at++) {
         const uint8_t number = (uint8_t)(at % PDCP_CHANNELS_MAX);
         if (bus->nodes.channels[number].node == node) {
-            pdcp_set_bit(bus->audit.refused[at / PDCP_CHANNELS_MAX], number, false);
+            pdcp_bit_set(bus->audit.refused[at / PDCP_CHANNELS_MAX], number, false);
         }
     }
     if (bus->audit.asleep) {
@@ -47,7 +47,7 @@ void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
 {
     uint8_t node;
     if (pdcp_nodes_owner(&bus->nodes, node_id, &node) && node != PDCP_NONE) {
-        pdcp_set_bit(bus->audit.hurried, node, true);
+        pdcp_bit_set(bus->audit.hurried, node, true);
     }
 }
 
@@ -157,7 +157,7 @@ static bool ask_hurried(pdcp_bus_t *bus)
         }
         audit->first = (uint8_t)((audit->first + 1u) % PDCP_DEVICES_MAX);
         audit->at[PDCP_AUDIT_HURRY] = pdcp_bit(audit->hurried, audit->first) ? 0 : WALK_END;
-        pdcp_set_bit(audit->hurried, audit->first, false);
+        pdcp_bit_set(audit->hurried, audit->first, false);
     }
     return false;
 }
@@ -284,7 +284,7 @@ void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
     }
     bus->audit.asked = PDCP_NONE;
     if (reply->status != PDCP_OK) {
-        pdcp_set_bit(bus->audit.refused[bus->audit.asked_kind], number, true);
+        pdcp_bit_set(bus->audit.refused[bus->audit.asked_kind], number, true);
     } else if (!agrees(bus, number, reply)) {
         on_difference(bus, number);
     } else if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {

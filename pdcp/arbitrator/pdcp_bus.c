@@ -28,7 +28,7 @@ bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame)
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg)
 {
     can_frame_t frame;
-    pdcp_encode(pdcp_can_id(priority, true, node_id), msg, &frame);
+    pdcp_codec_encode(pdcp_can_id(priority, true, node_id), msg, &frame);
     return pdcp_bus_send_frame(bus, &frame);
 }
 

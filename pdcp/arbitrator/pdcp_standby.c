@@ -45,7 +45,7 @@ bool pdcp_standby_on_beacon(pdcp_standby_t *standby, uint32_t now_ms)
 void pdcp_standby_on_request(pdcp_standby_t *standby, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
-    if (pdcp_decode(frame, &msg) != PDCP_DECODE_OK || (msg.code & PDCP_ANSWER) != 0) {
+    if (pdcp_codec_decode(frame, &msg) != PDCP_DECODE_OK || (msg.code & PDCP_ANSWER) != 0) {
         return;
     }
     standby->asked_id = pdcp_id_node(frame->id);

@@ -40,7 +40,7 @@ void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         if (node_id == PDCP_NODE_BROADCAST || node_id == pdcp_bus_node(bus, i)->node_id) {
-            pdcp_set_bit(bus->suspend.release, i, true);
+            pdcp_bit_set(bus->suspend.release, i, true);
         }
     }
     wake(bus, PDCP_RELEASE_MS);
@@ -49,7 +49,7 @@ void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
 void pdcp_suspend_on_reply(pdcp_bus_t *bus, uint8_t node, pdcp_status_t status)
 {
     if (status == PDCP_ERR_NO_ANSWER) {
-        pdcp_set_bit(bus->suspend.release, node, true);
+        pdcp_bit_set(bus->suspend.release, node, true);
         wake(bus, PDCP_RELEASE_AGAIN_MS);
     }
 }
@@ -59,14 +59,14 @@ void pdcp_suspend_on_lost(pdcp_bus_t *bus, uint8_t node)
     const pdcp_request_t *request = &pdcp_bus_node(bus, node)->request;
     if (request->state != PDCP_REQUEST_IDLE && request->client == PDCP_CLIENT_AUDIT &&
         request->code == PDCP_RELEASE) {
-        pdcp_set_bit(bus->suspend.release, node, true);
+        pdcp_bit_set(bus->suspend.release, node, true);
     }
 }
 
 void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t node)
 {
     bus->suspend.left[node] = 0;
-    pdcp_set_bit(bus->suspend.release, node, false);
+    pdcp_bit_set(bus->suspend.release, node, false);
 }
 
 /* Tells a device Release if it is to be told and can be. False: it is to be told later. */
@@ -78,7 +78,7 @@ static bool release(pdcp_bus_t *bus, uint8_t node)
     if (!pdcp_request_is_idle(bus, node) || bus->txq.count > PDCP_TX_MAX / 2) {
         return false;
     }
-    pdcp_set_bit(bus->suspend.release, node, false);
+    pdcp_bit_set(bus->suspend.release, node, false);
     if (bus->suspend.left[node] == 0 && pdcp_nodes_is_bound(&bus->nodes, node)) {
         pdcp_request_command(bus, node, PDCP_CLIENT_AUDIT, PDCP_RELEASE, 0);
     }

@@ -34,8 +34,8 @@ static uint8_t ticks_since(const pdcp_unknown_t *unknown, uint8_t tick)
 static void set_tick(pdcp_unknown_t *unknown, uint8_t id, uint8_t tick, bool told)
 {
     unknown->heard[id] = tick;
-    pdcp_set_bit(unknown->told, id, told);
-    pdcp_set_bit(unknown->answered, id, false);
+    pdcp_bit_set(unknown->told, id, told);
+    pdcp_bit_set(unknown->answered, id, false);
 }
 
 /* Forgets what is too old to matter, before its tick comes round again. */
@@ -78,7 +78,7 @@ void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_on_time(unknown, now_ms);
     if (is_told(unknown, id)) { /* the time of the Reset stays, for its pause */
-        pdcp_set_bit(unknown->answered, id, false);
+        pdcp_bit_set(unknown->answered, id, false);
     } else {
         set_tick(unknown, id, unknown->tick, false);
     }
@@ -87,7 +87,7 @@ void pdcp_unknown_note(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_note(unknown, now_ms, id);
-    pdcp_set_bit(unknown->answered, id, is_told(unknown, id));
+    pdcp_bit_set(unknown->answered, id, is_told(unknown, id));
 }
 
 bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)

@@ -10,7 +10,7 @@ bool pdcp_bit(const uint8_t *bits, uint8_t number)
     return (bits[number / 8u] & mask_of(number)) != 0;
 }
 
-void pdcp_set_bit(uint8_t *bits, uint8_t number, bool value)
+void pdcp_bit_set(uint8_t *bits, uint8_t number, bool value)
 {
     uint8_t *byte = &bits[number / 8u];
     *byte = (uint8_t)(value ? *byte | mask_of(number) : *byte & ~mask_of(number));

@@ -9,6 +9,6 @@
 #define PDCP_BIT_BYTES(count) (((count) + 7) / 8)
 
 bool pdcp_bit(const uint8_t *bits, uint8_t number);
-void pdcp_set_bit(uint8_t *bits, uint8_t number, bool value);
+void pdcp_bit_set(uint8_t *bits, uint8_t number, bool value);
 
 #endif

@@ -95,7 +95,7 @@ static void take_fields(uint8_t fields, const uint8_t *at, const uint8_t *end, p
     }
 }
 
-pdcp_decode_t pdcp_decode(const can_frame_t *frame, pdcp_msg_t *msg)
+pdcp_decode_t pdcp_codec_decode(const can_frame_t *frame, pdcp_msg_t *msg)
 {
     memset(msg, 0, sizeof *msg);
     if (frame->dlc == 0) {
@@ -150,7 +150,7 @@ static uint8_t *put_fields(uint8_t fields, const pdcp_msg_t *msg, uint8_t *at)
     return at;
 }
 
-void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame)
+void pdcp_codec_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame)
 {
     memset(frame, 0, sizeof *frame);
     frame->id = can_id;

@@ -55,10 +55,10 @@ static inline uint8_t pdcp_id_node(uint16_t can_id)
 /* Decodes the data of a frame that carries a function code. Accepts the sizes of both tables of the source
  * (D-BUS-3); an answer too short to hold its response code means success (D-BUS-18). On anything but
  * PDCP_DECODE_OK msg holds the code alone. */
-pdcp_decode_t pdcp_decode(const can_frame_t *frame, pdcp_msg_t *msg);
+pdcp_decode_t pdcp_codec_decode(const can_frame_t *frame, pdcp_msg_t *msg);
 
 /* Builds the frame of a message, with the sizes of [PDCP 3.2]. msg->code must be one of the codes above,
  * msg->len at most what the code's value field holds. */
-void pdcp_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame);
+void pdcp_codec_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame);
 
 #endif

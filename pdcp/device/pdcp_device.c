@@ -239,7 +239,7 @@ static void dispatch(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg,
 
 static bool decode(pdcp_device_t *dev, const can_frame_t *frame, pdcp_msg_t *msg)
 {
-    switch (pdcp_decode(frame, msg)) {
+    switch (pdcp_codec_decode(frame, msg)) {
     case PDCP_DECODE_OK:
         return true;
     case PDCP_DECODE_BAD_DLC:

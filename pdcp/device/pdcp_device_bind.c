@@ -32,7 +32,7 @@ static void ask_for(pdcp_device_t *dev, uint32_t now_ms, uint8_t id)
     const pdcp_msg_t request = {.code = PDCP_BIND_DEVICE, .identity = dev->desc->identity};
     can_frame_t frame;
     dev->node_id = id;
-    pdcp_encode(pdcp_can_id(PDCP_PRIORITY_BINDING, false, id), &request, &frame);
+    pdcp_codec_encode(pdcp_can_id(PDCP_PRIORITY_BINDING, false, id), &request, &frame);
     if (pdcp_device_tx_frame(dev, &frame)) {
         dev->stats.bind_requests++;
     }

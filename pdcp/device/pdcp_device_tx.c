@@ -28,7 +28,7 @@ static bool is_waiting(const pdcp_device_t *dev, const can_frame_t *frame)
 void pdcp_device_tx_msg(pdcp_device_t *dev, const pdcp_msg_t *msg)
 {
     can_frame_t frame;
-    pdcp_encode(pdcp_can_id(PDCP_PRIORITY_NORMAL, false, dev->node_id), msg, &frame);
+    pdcp_codec_encode(pdcp_can_id(PDCP_PRIORITY_NORMAL, false, dev->node_id), msg, &frame);
     (void)pdcp_device_tx_frame(dev, &frame);
 }
 
@@ -44,7 +44,7 @@ void pdcp_device_tx_beacon(pdcp_device_t *dev)
 {
     const pdcp_msg_t beacon = {.code = PDCP_BEACON};
     can_frame_t frame;
-    pdcp_encode(pdcp_can_id(PDCP_PRIORITY_HIGH, false, dev->node_id), &beacon, &frame);
+    pdcp_codec_encode(pdcp_can_id(PDCP_PRIORITY_HIGH, false, dev->node_id), &beacon, &frame);
     if (!is_waiting(dev, &frame)) {
         (void)pdcp_device_tx_frame(dev, &frame);
     }

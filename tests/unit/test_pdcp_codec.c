@@ -160,7 +160,7 @@ static void test_every_message_decodes(void)
     for (unsigned i = 0; i < GOLDEN_COUNT; i++) {
         const can_frame_t frame = frame_of(&golden[i]);
         pdcp_msg_t msg;
-        TEST_ASSERT_EQUAL_MESSAGE(PDCP_DECODE_OK, pdcp_decode(&frame, &msg), golden[i].name);
+        TEST_ASSERT_EQUAL_MESSAGE(PDCP_DECODE_OK, pdcp_codec_decode(&frame, &msg), golden[i].name);
         const pdcp_msg_t *want = &golden[i].msg;
         TEST_ASSERT_EQUAL_HEX8_MESSAGE(want->code, msg.code, golden[i].name);
         TEST_ASSERT_EQUAL_MESSAGE(want->result, msg.result, golden[i].name);
@@ -182,7 +182,7 @@ static void test_every_message_encodes(void)
             continue;
         }
         can_frame_t frame;
-        pdcp_encode(golden[i].id, &golden[i].msg, &frame);
+        pdcp_codec_encode(golden[i].id, &golden[i].msg, &frame);
         TEST_ASSERT_EQUAL_HEX16_MESSAGE(golden[i].id, frame.id, golden[i].name);
         TEST_ASSERT_EQUAL_MESSAGE(CAN_FRAME_BASE, frame.kind, golden[i].name);
         TEST_ASSERT_EQUAL_MESSAGE(golden[i].dlc, frame.dlc, golden[i].name);
@@ -258,7 +258,7 @@ static void test_every_code_with_every_dlc_is_classified(void)
             } else if ((accepted_dlcs(code) & (1u << dlc)) != 0) {
                 want = PDCP_DECODE_OK;
             }
-            TEST_ASSERT_EQUAL(want, pdcp_decode(&frame, &msg));
+            TEST_ASSERT_EQUAL(want, pdcp_codec_decode(&frame, &msg));
         }
     }
 }
@@ -268,7 +268,7 @@ static void test_a_dlc_above_8_is_refused(void)
     for (unsigned dlc = 9; dlc < 256; dlc++) {
         const can_frame_t frame = {.id = 0x211, .dlc = (uint8_t)dlc, .data = {0x83}};
         pdcp_msg_t msg;
-        TEST_ASSERT_EQUAL(PDCP_DECODE_BAD_DLC, pdcp_decode(&frame, &msg));
+        TEST_ASSERT_EQUAL(PDCP_DECODE_BAD_DLC, pdcp_codec_decode(&frame, &msg));
     }
 }
 

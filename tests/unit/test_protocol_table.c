@@ -147,7 +147,7 @@ static void test_the_codec_takes_the_sizes_of_the_table(void)
                 const bool fits = ((function->dlc | function->also) >> dlc & 1u) != 0;
                 expected = fits ? PDCP_DECODE_OK : PDCP_DECODE_BAD_DLC;
             }
-            TEST_ASSERT_EQUAL_MESSAGE(expected, pdcp_decode(&frame, &msg), say("code", code));
+            TEST_ASSERT_EQUAL_MESSAGE(expected, pdcp_codec_decode(&frame, &msg), say("code", code));
         }
     }
 }
@@ -161,8 +161,8 @@ static void test_the_codec_sends_the_sizes_of_the_table(void)
             can_frame_t sent;
             pdcp_msg_t msg;
             if ((functions[i].dlc >> dlc & 1u) != 0) {
-                TEST_ASSERT_EQUAL(PDCP_DECODE_OK, pdcp_decode(&frame, &msg));
-                pdcp_encode(0x211, &msg, &sent);
+                TEST_ASSERT_EQUAL(PDCP_DECODE_OK, pdcp_codec_decode(&frame, &msg));
+                pdcp_codec_encode(0x211, &msg, &sent);
                 TEST_ASSERT_EQUAL_MESSAGE(dlc, sent.dlc, say("code", functions[i].code));
                 TEST_ASSERT_EQUAL_HEX8_ARRAY(frame.data, sent.data, dlc);
             }
@@ -196,7 +196,7 @@ static void test_the_codec_knows_where_the_fields_stand(void)
         const field_t *field = &fields[i];
         const can_frame_t frame = frame_of(0x211, field->code, longest(function_of(field->code)));
         pdcp_msg_t msg;
-        TEST_ASSERT_EQUAL(PDCP_DECODE_OK, pdcp_decode(&frame, &msg));
+        TEST_ASSERT_EQUAL(PDCP_DECODE_OK, pdcp_codec_decode(&frame, &msg));
         uint16_t expected = frame.data[field->at];
         if (field->size == 2) {
             expected = (uint16_t)(expected | frame.data[field->at + 1] << 8);

@@ -6,6 +6,7 @@
 
 void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms)
 {
+    memset(run, 0, sizeof *run);
     run->scene.nodes = nodes;
     run->scene.links = &run->links;
     run->stirred_ms = now_ms;

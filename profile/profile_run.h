@@ -65,7 +65,7 @@ typedef struct {
     profile_links_t links; /* the active configuration */
 } profile_run_t;
 
-/* run must be all zero before. nodes: the arbitrator's tables; they must outlive run. */
+/* nodes: the arbitrator's tables; they must outlive run. */
 void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms);
 
 /* Is a plan due or being carried out? */

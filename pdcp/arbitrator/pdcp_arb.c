@@ -3,8 +3,12 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_audit.h"
+#include "pdcp_bind.h"
 #include "pdcp_bytes.h"
+#include "pdcp_link.h"
 #include "pdcp_setup.h"
+#include "pdcp_suspend.h"
 #include "pdcp_time.h"
 
 /* Nothing is known of the bus; what is remembered and counted stays. Its devices may still speak. */

@@ -83,6 +83,9 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
 
+/* The same of a message that has no more than a code and a word. */
+bool pdcp_bus_send_word(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, uint8_t code, uint16_t word);
+
 /* Tells of a device (PDCP_NONE: of none), or of a channel: an input and its link. */
 void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status);
 void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status);

@@ -348,6 +348,21 @@ uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t inpu
     return PDCP_NONE;
 }
 
+/* Does this device, or do its channels, count for the host? Links count whatever becomes of their devices. */
+static bool counts(const pdcp_node_t *node, uint8_t kind)
+{
+    if (kind == PDCP_COUNTS_LINK) {
+        return true;
+    }
+    return node->beaconed &&
+           (kind == PDCP_COUNTS_DEVICE ? node->state != PDCP_NODE_LOST : node->state == PDCP_NODE_READY);
+}
+
+static bool is_of_kind(const pdcp_channel_t *channel, uint8_t kind)
+{
+    return kind == PDCP_COUNTS_LINK ? channel->link != PDCP_LINK_NONE : channel->transfer == kind;
+}
+
 /* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE:
  * there are fewer. number 0: how many there are. */
 static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
@@ -355,19 +370,14 @@ static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
     uint8_t count = 0;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         const pdcp_node_t *node = &nodes->nodes[i];
-        if (kind != PDCP_COUNTS_LINK && !node->beaconed) {
+        if (!counts(node, kind)) {
             continue;
         }
-        if (kind == PDCP_COUNTS_DEVICE && node->state != PDCP_NODE_LOST && ++count == number) {
+        if (kind == PDCP_COUNTS_DEVICE && ++count == number) {
             return i;
         }
-        if (kind != PDCP_COUNTS_LINK && node->state != PDCP_NODE_READY) {
-            continue;
-        }
         for (uint8_t c = node->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-            const pdcp_channel_t *channel = &nodes->channels[c];
-            const uint8_t is_one = kind == PDCP_COUNTS_LINK ? channel->link : channel->transfer == kind;
-            if (is_one != 0 && ++count == number) {
+            if (is_of_kind(&nodes->channels[c], kind) && ++count == number) {
                 return c;
             }
         }

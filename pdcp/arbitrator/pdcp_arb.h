@@ -12,40 +12,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "can_frame.h"
-#include "pdcp_bus.h"
-#include "pdcp_recovery.h"
-#include "pdcp_standby.h"
-
-/* The host's request to a device; one at a time. */
-typedef struct {
-    bool active;
-    bool waiting;   /* for the device's place */
-    uint8_t client; /* PDCP_CLIENT_HOST; PDCP_CLIENT_RAW: a frame as the host made it, bytes holds its data, 8
-                       bytes of room, size is its DLC */
-    uint8_t code; /* PDCP_GET_PARAMETER, PDCP_SET_PARAMETER, PDCP_SUSPEND, PDCP_RELEASE; raw: any request's */
-    uint8_t node;
-    uint8_t channel;
-    uint8_t param;
-    uint8_t *bytes; /* the application's, size bytes of room or of value */
-    uint16_t size;  /* of PDCP_SUSPEND: the time in ms */
-    uint16_t len;   /* got so far */
-} pdcp_host_request_t;
-
-typedef struct {
-    uint32_t asked_ms;  /* when a device asked to bind last, or the start */
-    uint32_t beacon_ms; /* when its last beacon left */
-    uint32_t serial;
-    uint16_t
-        held_ms; /* the first grants were held for so long: taken off the start-up's quiet time (D-BUS-34) */
-    bool silent; /* on standby (D-BUS-42) */
-    bool listening; /* its beacons did not leave for too long: it sends nothing for a while (D-BUS-42) */
-    bool restart;   /* the controller is to be restarted */
-    pdcp_host_request_t host;
-    pdcp_bus_t bus;
-    pdcp_recovery_t recovery;
-    pdcp_standby_t standby;
-} pdcp_arb_t;
+#include "pdcp_arb_state.h"
 
 /* on_event: see pdcp_bus.h. serial tells arbitrators apart: it spreads the times of D-BUS-42.
  * seed should differ from start to start: it decides where the ids of outputs begin (D-BUS-36). The first

@@ -4,6 +4,7 @@
 
 #include "pdcp_bus.h"
 #include "pdcp_bytes.h"
+#include "pdcp_link.h"
 
 enum {
     SPARE_EVERY = 4,                   /* of so many questions one is for a channel without a link */
@@ -218,7 +219,8 @@ static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
                pdcp_bytes_value_u8(reply->bytes, reply->len, 1) == source->node_id;
     }
     return channel->link != PDCP_LINK_NONE
-               ? pdcp_nodes_is_source(channel, reply)
+               ? pdcp_nodes_is_source(channel, reply->param, pdcp_request_word(reply, 0),
+                                      pdcp_request_word(reply, 2))
                : !pdcp_nodes_is_named(pdcp_bytes_value_u8(reply->bytes, reply->len, 2));
 }
 

@@ -17,76 +17,32 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_bits.h"
-#include "pdcp_limits.h"
 #include "pdcp_request.h"
-#include "pdcp_spec.h"
-
-struct pdcp_bus;
 
 enum {
     PDCP_AUDIT_MS = 60,    /* between two questions */
     PDCP_AUDIT_REPAIRS = 3 /* of one link within a minute */
 };
 
-/* What may be asked of a channel, what data depend on first. */
-typedef enum {
-    PDCP_AUDIT_ENABLED, /* 4 */
-    PDCP_AUDIT_NODES,   /* an input's 7, an output's 5 */
-    PDCP_AUDIT_SOURCE,  /* an input's 5 */
-    PDCP_AUDIT_SERIAL,  /* an input's 6 */
-    PDCP_AUDIT_KINDS
-} pdcp_audit_kind_t;
-
-/* The walks over all channels: one kind of question for every channel, then the next kind. */
-typedef enum {
-    PDCP_AUDIT_TURN,  /* all that is linked */
-    PDCP_AUDIT_HURRY, /* the device that goes first: its channels without a link, too */
-    PDCP_AUDIT_SPARE, /* channels without a link */
-    PDCP_AUDIT_WALKS
-} pdcp_audit_walk_t;
-
-/* Differences found in the minute under way. */
-typedef struct {
-    uint8_t channel; /* number; an output's are counted with the first input that it feeds */
-    bool source;     /* of an input's 5 and 6; else of 4, 7 and an output's 5 */
-    uint8_t times;   /* 0: this entry is free, and so are those behind it */
-} pdcp_audit_found_t;
-
-typedef struct {
-    bool on;             /* it was begun */
-    bool asleep;         /* no device is ready: the timer does not run */
-    uint8_t count;       /* of questions */
-    uint8_t asked;       /* channel number of the question under way; PDCP_NONE: its answer is not compared */
-    uint8_t asked_kind;  /* pdcp_audit_kind_t of the question */
-    uint8_t asked_place; /* of the device that was asked last */
-    uint8_t first;       /* place of the device that goes first, or did last */
-    uint16_t window;     /* what is left of the minute under way, in PDCP_AUDIT_MS; 0: none is */
-    uint16_t at[PDCP_AUDIT_WALKS]; /* where each walk is: kind * PDCP_CHANNELS_MAX + channel number */
-    pdcp_audit_found_t found[PDCP_AUDIT_FOUND_MAX];
-    uint8_t hurried[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)];                    /* set of places: to go first */
-    uint8_t refused[PDCP_AUDIT_KINDS][PDCP_BIT_BYTES(PDCP_CHANNELS_MAX)]; /* sets of channels, by kind */
-} pdcp_audit_t;
-
 /* Nothing is known of the bus. What was begun goes on. */
-void pdcp_audit_init(struct pdcp_bus *bus);
+void pdcp_audit_init(pdcp_bus_t *bus);
 
 /* Begins to ask. */
-void pdcp_audit_begin(struct pdcp_bus *bus);
+void pdcp_audit_begin(pdcp_bus_t *bus);
 
 /* A device is set up: it is asked again what it has refused. */
-void pdcp_audit_on_ready(struct pdcp_bus *bus, uint8_t node);
+void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node);
 
 /* Somebody else has spoken to the device with this node id in the name of an arbitrator: it goes first. */
-void pdcp_audit_on_foreign(struct pdcp_bus *bus, uint8_t node_id);
+void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id);
 
 /* A link changes, or is about to: the answer to the question under way is not compared. */
-void pdcp_audit_on_change(struct pdcp_bus *bus);
+void pdcp_audit_on_change(pdcp_bus_t *bus);
 
 /* PDCP_TIMER_AUDIT is due; calm: nothing else is to be done, so a question may be asked. */
-void pdcp_audit_on_deadline(struct pdcp_bus *bus, bool calm);
+void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm);
 
 /* A reply to a question. Silence is no evidence (D-BUS-59). */
-void pdcp_audit_on_reply(struct pdcp_bus *bus, const pdcp_reply_t *reply);
+void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply);
 
 #endif

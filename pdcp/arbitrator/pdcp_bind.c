@@ -3,7 +3,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "pdcp_bus.h"
 #include "pdcp_time.h"
 
 static bool is_node_id(uint8_t id)

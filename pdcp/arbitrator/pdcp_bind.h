@@ -9,32 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_identity.h"
-#include "pdcp_limits.h"
-#include "pdcp_spec.h"
-
-struct pdcp_bus;
-struct pdcp_channel;
-struct pdcp_node;
-
-typedef struct {
-    pdcp_identity_t identity;
-    uint8_t node_id;
-} pdcp_remembered_t;
-
-typedef struct {
-    pdcp_identity_t identity;
-    uint8_t node_id; /* 0: this entry is free */
-    uint32_t until_ms;
-} pdcp_reserved_t;
-
-typedef struct {
-    uint8_t output_id; /* where the search for the next id of an output begins */
-    bool shut;         /* somebody lives on from before the start: no ids for outputs until PDCP_SHUT_MS */
-    uint8_t remembered_count;
-    pdcp_remembered_t remembered[PDCP_IDENTITIES_MAX];
-    pdcp_reserved_t reserved[PDCP_RESERVED_MAX];
-} pdcp_bind_t;
+#include "pdcp_bus.h"
 
 /* What came of a bind request. */
 typedef enum {
@@ -56,36 +31,36 @@ bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry
 
 /* Is the identity remembered, or part of a stored limb? Others are kept out when places become few
  * (D-BUS-43). */
-bool pdcp_bind_is_known(const struct pdcp_bus *bus, const pdcp_identity_t *identity);
+bool pdcp_bind_is_known(const pdcp_bus_t *bus, const pdcp_identity_t *identity);
 
 /* A device is set up: it is remembered with its id (D-BUS-43). */
-void pdcp_bind_on_ready(struct pdcp_bus *bus, const struct pdcp_node *device);
+void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_node_t *device);
 
 /* Frees reservations that are over; to be called every few days at least. */
-void pdcp_bind_on_time(struct pdcp_bus *bus);
+void pdcp_bind_on_time(pdcp_bus_t *bus);
 
 /* A bind request with node id asked. Answers it, unless the result is PDCP_BIND_CHECK. */
-pdcp_bind_result_t pdcp_bind_on_request(struct pdcp_bus *bus, const pdcp_identity_t *identity, uint8_t asked,
+pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
                                         uint8_t *node);
 
 /* The check of a bound device is over. It answered: the asking device is another one, refuse it with id 0. It
  * did not: it was reset and is granted its id again (or suggested it). Answers the request that
  * pdcp_bind_on_request left open. */
-pdcp_bind_result_t pdcp_bind_after_check(struct pdcp_bus *bus, uint8_t node, bool answered);
+pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t node, bool answered);
 
 /* Is no output given an id at this time, because somebody may still speak on any or listen to it (D-BUS-36,
  * D-BUS-48)? */
-bool pdcp_bind_is_shut(const struct pdcp_bus *bus);
+bool pdcp_bind_is_shut(const pdcp_bus_t *bus);
 
 /* The node id that an output without one is to have: one that nobody owns, speaks on or listens to, and while
  * there is one, that is not remembered for a device, else that of the device that was away longest; if all
  * are in use, the one that was unheard longest (D-BUS-36). A freed id comes last. 0: none is left. */
-uint8_t pdcp_bind_output_id(const struct pdcp_bus *bus);
+uint8_t pdcp_bind_output_id(const pdcp_bus_t *bus);
 
 /* Gives an output without an id that one. False: none is left, or the time has not come. */
-bool pdcp_bind_give_output_id(struct pdcp_bus *bus, struct pdcp_channel *output);
+bool pdcp_bind_give_output_id(pdcp_bus_t *bus, pdcp_channel_t *output);
 
 /* Takes the id of an output away. Somebody may still speak on it. */
-void pdcp_bind_take_output_id(struct pdcp_bus *bus, struct pdcp_channel *output);
+void pdcp_bind_take_output_id(pdcp_bus_t *bus, pdcp_channel_t *output);
 
 #endif

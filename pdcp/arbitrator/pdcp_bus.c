@@ -32,6 +32,12 @@ bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdc
     return pdcp_bus_send_frame(bus, &frame);
 }
 
+bool pdcp_bus_send_word(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, uint8_t code, uint16_t word)
+{
+    const pdcp_msg_t msg = {.code = code, .word = word};
+    return pdcp_bus_send(bus, priority, node_id, &msg);
+}
+
 static void tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
                  pdcp_status_t status)
 {

@@ -4,13 +4,10 @@
 #ifndef PDCP_BUS_H
 #define PDCP_BUS_H
 
-#include "pdcp_audit.h"
-#include "pdcp_bind.h"
 #include "pdcp_codec.h"
-#include "pdcp_link.h"
 #include "pdcp_nodes.h"
+#include "pdcp_parts.h"
 #include "pdcp_stats.h"
-#include "pdcp_suspend.h"
 #include "pdcp_timers.h"
 #include "pdcp_txq.h"
 #include "pdcp_unknown.h"
@@ -52,7 +49,7 @@ typedef bool (*pdcp_knows_fn)(void *ctx, const pdcp_identity_t *identity);
 
 /* Small state stands first here and in the structs around it: on the smallest part, a field that lies farther
  * than 511 bytes from the beginning costs twice the instructions. */
-typedef struct pdcp_bus {
+typedef struct {
     uint32_t now_ms;      /* of the call that the arbitrator is in: its functions note it first of all */
     uint32_t started_ms;  /* slides along behind: see pdcp_bus_age_ms */
     uint32_t silenced_ms; /* when an output answered last that it is not enabled any more */
@@ -85,6 +82,9 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
  * counted. */
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
+
+/* The same of a message that has no more than a code and a word. */
+bool pdcp_bus_send_word(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, uint8_t code, uint16_t word);
 
 /* Tells of a device (PDCP_NONE: of none), or of a channel: an input and its link. */
 void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status);

@@ -3,7 +3,8 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "pdcp_bus.h"
+#include "pdcp_audit.h"
+#include "pdcp_bind.h"
 #include "pdcp_bytes.h"
 
 /* Steps of a job in the order of making a link; undoing and removing run through them backwards. */
@@ -642,9 +643,11 @@ static void took_effect(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     pdcp_channel_t *channel = channel_of(bus, target_of(bus));
     if (bus->link.step <= STEP_READ_SERIAL) {
+        const uint16_t low = pdcp_request_word(reply, 0);
+        const uint16_t high = pdcp_request_word(reply, 2);
         if (bus->link.kind == PDCP_TODO_UPDATE) {
-            pdcp_nodes_take_source(channel, reply);
-        } else if (!pdcp_nodes_is_source(channel, reply)) {
+            pdcp_nodes_take_source(channel, reply->param, low, high);
+        } else if (!pdcp_nodes_is_source(channel, reply->param, low, high)) {
             bus->link.differs = true;
         }
     } else if (bus->link.step == STEP_INPUT_OFF || (bus->link.step >= STEP_INPUT_ON && bus->link.undoing)) {

@@ -156,14 +156,12 @@ void pdcp_nodes_clear_source(pdcp_channel_t *input)
     input->source_profile = 0;
 }
 
-void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
 {
-    const uint16_t low = pdcp_bytes_value_u16(reply->bytes, reply->len, 0);
-    const uint16_t high = pdcp_bytes_value_u16(reply->bytes, reply->len, 2);
-    if (reply->param == PDCP_IN_SOURCE_VID_PID) {
+    if (param == PDCP_IN_SOURCE_VID_PID) {
         input->source.vid = low;
         input->source.pid = high;
-    } else if (reply->param == PDCP_IN_SOURCE_SERIAL) {
+    } else if (param == PDCP_IN_SOURCE_SERIAL) {
         input->source.sn = low;
         input->source_index = (uint8_t)(high & 0xFFu);
     } else {
@@ -172,14 +170,12 @@ void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply)
     }
 }
 
-bool pdcp_nodes_is_source(const pdcp_channel_t *input, const pdcp_reply_t *reply)
+bool pdcp_nodes_is_source(const pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
 {
-    const uint16_t low = pdcp_bytes_value_u16(reply->bytes, reply->len, 0);
-    const uint16_t high = pdcp_bytes_value_u16(reply->bytes, reply->len, 2);
-    if (reply->param == PDCP_IN_SOURCE_VID_PID) {
+    if (param == PDCP_IN_SOURCE_VID_PID) {
         return input->source.vid == low && input->source.pid == high;
     }
-    if (reply->param == PDCP_IN_SOURCE_SERIAL) {
+    if (param == PDCP_IN_SOURCE_SERIAL) {
         return input->source.sn == low && input->source_index == (uint8_t)(high & 0xFFu);
     }
     return input->source_type == low && input->source_profile == high;
@@ -290,17 +286,18 @@ static uint8_t mask_of(uint16_t bit)
     return (uint8_t)(0x80u >> (bit % 8u));
 }
 
-void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, const pdcp_reply_t *reply)
+void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
+                          const uint8_t *bytes, uint16_t len)
 {
     const pdcp_channel_t *needing = &nodes->channels[channel];
     const pdcp_node_t *owner = &nodes->nodes[needing->node];
-    uint8_t *set = &nodes->needs[set_at(owner, needing, reply->param == PDCP_CH_DESIRED)];
+    uint8_t *set = &nodes->needs[set_at(owner, needing, desired)];
     uint16_t bit = 0; /* of an input in a set of its device */
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
         const pdcp_channel_t *input = &nodes->channels[c];
         if (input->transfer == PDCP_INPUT) {
-            const uint16_t from = (uint16_t)(input->index - 8u * reply->offset); /* large before the offset */
-            if (from / 8u < reply->len && (reply->bytes[from / 8u] & mask_of(from)) != 0) {
+            const uint16_t from = (uint16_t)(input->index - 8u * offset); /* large before the offset */
+            if (from / 8u < len && (bytes[from / 8u] & mask_of(from)) != 0) {
                 set[bit / 8u] |= mask_of(bit);
             }
             bit++;
@@ -351,6 +348,21 @@ uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t inpu
     return PDCP_NONE;
 }
 
+/* Does this device, or do its channels, count for the host? Links count whatever becomes of their devices. */
+static bool counts(const pdcp_node_t *node, uint8_t kind)
+{
+    if (kind == PDCP_COUNTS_LINK) {
+        return true;
+    }
+    return node->beaconed &&
+           (kind == PDCP_COUNTS_DEVICE ? node->state != PDCP_NODE_LOST : node->state == PDCP_NODE_READY);
+}
+
+static bool is_of_kind(const pdcp_channel_t *channel, uint8_t kind)
+{
+    return kind == PDCP_COUNTS_LINK ? channel->link != PDCP_LINK_NONE : channel->transfer == kind;
+}
+
 /* Walks over the places in their order and each device's channels: the number-th that counts, PDCP_NONE:
  * there are fewer. number 0: how many there are. */
 static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
@@ -358,19 +370,14 @@ static uint8_t walk(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number)
     uint8_t count = 0;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
         const pdcp_node_t *node = &nodes->nodes[i];
-        if (kind != PDCP_COUNTS_LINK && !node->beaconed) {
+        if (!counts(node, kind)) {
             continue;
         }
-        if (kind == PDCP_COUNTS_DEVICE && node->state != PDCP_NODE_LOST && ++count == number) {
+        if (kind == PDCP_COUNTS_DEVICE && ++count == number) {
             return i;
         }
-        if (kind != PDCP_COUNTS_LINK && node->state != PDCP_NODE_READY) {
-            continue;
-        }
         for (uint8_t c = node->first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-            const pdcp_channel_t *channel = &nodes->channels[c];
-            const uint8_t is_one = kind == PDCP_COUNTS_LINK ? channel->link : channel->transfer == kind;
-            if (is_one != 0 && ++count == number) {
+            if (is_of_kind(&nodes->channels[c], kind) && ++count == number) {
                 return c;
             }
         }

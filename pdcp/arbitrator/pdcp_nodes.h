@@ -10,8 +10,7 @@
 #include <stdint.h>
 
 #include "pdcp_identity.h"
-#include "pdcp_limits.h"
-#include "pdcp_request.h"
+#include "pdcp_parts.h"
 #include "pdcp_spec.h"
 
 #define PDCP_NONE 0xFFu
@@ -25,7 +24,7 @@ typedef enum {
     PDCP_NODE_ASKED   /* its bind request is held (D-BUS-42): neither node id nor channels yet */
 } pdcp_node_state_t;
 
-typedef struct pdcp_node {
+typedef struct {
     pdcp_identity_t identity;
     uint16_t type;
     uint16_t profile;
@@ -71,7 +70,7 @@ typedef enum {
     PDCP_TODO_AGAIN = 32   /* silence it: the write before was not answered, and everybody else comes first */
 } pdcp_todo_t;
 
-typedef struct pdcp_channel {
+typedef struct {
     uint16_t type;
     uint16_t profile;
     uint8_t node;     /* place of the owner; PDCP_NONE: this entry of the pool is free */
@@ -134,8 +133,8 @@ uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t inde
 /* Makes the source of an input that of an unconnected one (D-BUS-7). */
 void pdcp_nodes_clear_source(pdcp_channel_t *input);
 
-/* Takes over a parameter that names the source of an input, 5, 6 or 8. */
-void pdcp_nodes_take_source(pdcp_channel_t *input, const pdcp_reply_t *reply);
+/* Takes over a parameter that names the source of an input: 5, 6 or 8, its two numbers of 16 bits. */
+void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Does this channel index name a source? An unconnected input has FFh (D-BUS-7). */
 static inline bool pdcp_nodes_is_named(uint8_t index)
@@ -143,17 +142,18 @@ static inline bool pdcp_nodes_is_named(uint8_t index)
     return index != PDCP_NO_SOURCE_INDEX && index != 0;
 }
 
-/* Does a parameter that names the source of an input, 5, 6 or 8, say what the tables say? */
-bool pdcp_nodes_is_source(const pdcp_channel_t *input, const pdcp_reply_t *reply);
+/* Do the numbers of such a parameter say what the tables say? */
+bool pdcp_nodes_is_source(const pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */
 bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
 
-/* Stores what has come of a bit string of required or desired channels, parameter 9 or 10: bit 7 of byte 0 is
- * channel index 0 (D-BUS-8). Offsets are below PDCP_PARAMETER_MAX. Bits of channels that are no inputs of the
- * device are dropped (D-BUS-13). */
-void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, const pdcp_reply_t *reply);
+/* Stores a piece of a channel's bit string of required or desired channels: len bytes from byte offset on,
+ * which is below PDCP_PARAMETER_MAX. Bit 7 of byte 0 is channel index 0 (D-BUS-8). Bits of channels that are
+ * no inputs of the device are dropped (D-BUS-13). */
+void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
+                          const uint8_t *bytes, uint16_t len);
 
 /* Does channel need (or desire) the input with this index of its own device, which must have room for needs?
  */

@@ -2,7 +2,7 @@
 
 #include <string.h>
 
-#include "pdcp_bus.h"
+#include "pdcp_bytes.h"
 
 bool pdcp_request_is_idle(pdcp_bus_t *bus, uint8_t node)
 {
@@ -356,4 +356,9 @@ bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t node, pdcp_reply_t *reply
         pdcp_bus_count(bus, PDCP_STAT_NO_ANSWER);
     }
     return finish(bus, device, PDCP_ERR_NO_ANSWER, reply);
+}
+
+uint16_t pdcp_request_word(const pdcp_reply_t *reply, uint8_t at)
+{
+    return pdcp_bytes_value_u16(reply->bytes, reply->len, at);
 }

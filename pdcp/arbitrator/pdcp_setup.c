@@ -2,7 +2,9 @@
 
 #include <stddef.h>
 
+#include "pdcp_bind.h"
 #include "pdcp_bytes.h"
+#include "pdcp_link.h"
 
 typedef enum { PASS_DEVICE, PASS_SILENCE, PASS_DIRECTION, PASS_CHANNELS } pass_t;
 
@@ -250,12 +252,12 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
 
 /* What an input names as its source counts only while the arbitrator knows of no link: else the device is
  * told what it should name (D-BUS-38). */
-static void take_source(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
+static void take_source(pdcp_bus_t *bus, uint8_t number, uint8_t param, uint16_t low, uint16_t high)
 {
     pdcp_channel_t *input = &bus->nodes.channels[number];
     if (input->link == PDCP_LINK_NONE) {
-        pdcp_nodes_take_source(input, reply);
-    } else if (!pdcp_nodes_is_source(input, reply)) {
+        pdcp_nodes_take_source(input, param, low, high);
+    } else if (!pdcp_nodes_is_source(input, param, low, high)) {
         pdcp_link_write(bus, number);
     }
 }
@@ -282,7 +284,7 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
     case PDCP_IN_SOURCE_SERIAL:
     case PDCP_IN_SOURCE_TYPE:
         if (reply->code == PDCP_GET_PARAMETER) {
-            take_source(bus, number, reply);
+            take_source(bus, number, reply->param, low, high);
         }
         break;
     default:
@@ -296,14 +298,15 @@ static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply
 {
     if (device->setup_pass != PASS_DEVICE &&
         (reply->param == PDCP_CH_REQUIRED || reply->param == PDCP_CH_DESIRED)) {
-        pdcp_nodes_put_needs(&bus->nodes, device->setup_channel, reply);
+        pdcp_nodes_put_needs(&bus->nodes, device->setup_channel, reply->param == PDCP_CH_DESIRED,
+                             reply->offset, reply->bytes, reply->len);
         return true;
     }
     if (reply->offset != 0) {
         return true;
     }
-    const uint16_t low = pdcp_bytes_value_u16(reply->bytes, reply->len, 0);
-    const uint16_t high = pdcp_bytes_value_u16(reply->bytes, reply->len, 2);
+    const uint16_t low = pdcp_request_word(reply, 0);
+    const uint16_t high = pdcp_request_word(reply, 2);
     return device->setup_pass == PASS_DEVICE ? take_device(bus, device, reply->param, low, high)
                                              : take_channel(bus, device->setup_channel, reply, low, high);
 }

@@ -8,7 +8,7 @@
 #ifndef PDCP_SETUP_H
 #define PDCP_SETUP_H
 
-#include "pdcp_bus.h"
+#include "pdcp_request.h"
 
 /* Puts a device at the beginning of its setup, in whatever state it is; its place must have no request under
  * way. */

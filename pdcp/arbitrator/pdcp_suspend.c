@@ -1,6 +1,6 @@
 #include "pdcp_suspend.h"
 
-#include "pdcp_bus.h"
+#include "pdcp_request.h"
 
 /* Beacons until a time is over. The first one may leave at once, and a part of the last interval counts as a
  * whole one: up to a second too many, and none too few (D-BUS-58). */

@@ -9,11 +9,7 @@
 
 #include <stdint.h>
 
-#include "pdcp_bits.h"
-#include "pdcp_limits.h"
-#include "pdcp_request.h"
-
-struct pdcp_bus;
+#include "pdcp_bus.h"
 
 enum {
     PDCP_SUSPENDED_FOR_GOOD = 0xFF, /* until released */
@@ -21,36 +17,27 @@ enum {
     PDCP_RELEASE_AGAIN_MS = 1000 /* until a device that did not answer is told again */
 };
 
-/* All 0: nobody is suspended. */
-typedef struct {
-    uint8_t left[PDCP_DEVICES_MAX]; /* by place, suspended by the host: beacons of the arbitrator until that
-                                       is over, up to 133, or PDCP_SUSPENDED_FOR_GOOD; 0: not suspended, or
-                                       nobody is there */
-    uint8_t release[PDCP_BIT_BYTES(
-        PDCP_DEVICES_MAX)]; /* set of places: to be told Release, if bound and left is 0 */
-} pdcp_suspend_t;
-
 /* The host has sent Suspend, for time_ms, 0: until released, or Release; to a device or (PDCP_NONE) to all.
  */
-void pdcp_suspend_on_host(struct pdcp_bus *bus, uint8_t node, uint8_t code, uint16_t time_ms);
+void pdcp_suspend_on_host(pdcp_bus_t *bus, uint8_t node, uint8_t code, uint16_t time_ms);
 
 /* A device was bound: it is not suspended. */
-void pdcp_suspend_on_bound(struct pdcp_bus *bus, uint8_t node);
+void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t node);
 
 /* Somebody else has sent Suspend to this node id, 0: to all. */
-void pdcp_suspend_on_foreign(struct pdcp_bus *bus, uint8_t node_id);
+void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id);
 
 /* A beacon of the arbitrator leaves: half a second has passed. */
-void pdcp_suspend_on_beacon(struct pdcp_bus *bus);
+void pdcp_suspend_on_beacon(pdcp_bus_t *bus);
 
 /* A device is lost, its request not yet cancelled: a Release that was not answered is due again when it is
  * back. */
-void pdcp_suspend_on_lost(struct pdcp_bus *bus, uint8_t node);
+void pdcp_suspend_on_lost(pdcp_bus_t *bus, uint8_t node);
 
 /* A device was told Release. */
-void pdcp_suspend_on_reply(struct pdcp_bus *bus, uint8_t node, pdcp_status_t status);
+void pdcp_suspend_on_reply(pdcp_bus_t *bus, uint8_t node, pdcp_status_t status);
 
 /* PDCP_TIMER_RELEASE is due: devices are told Release as their places are free. */
-void pdcp_suspend_on_deadline(struct pdcp_bus *bus);
+void pdcp_suspend_on_deadline(pdcp_bus_t *bus);
 
 #endif

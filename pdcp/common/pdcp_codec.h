@@ -52,6 +52,12 @@ static inline uint8_t pdcp_id_node(uint16_t can_id)
     return (uint8_t)(can_id & 0xFFu);
 }
 
+/* Is the frame a beacon, of whomever? */
+static inline bool pdcp_codec_is_beacon(const can_frame_t *frame)
+{
+    return frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
+}
+
 /* Decodes the data of a frame that carries a function code. Accepts the sizes of both tables of the source
  * (D-BUS-3); an answer too short to hold its response code means success (D-BUS-18). On anything but
  * PDCP_DECODE_OK msg holds the code alone. */

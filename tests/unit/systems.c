@@ -173,9 +173,7 @@ static void put_set(systems_t *s, uint8_t channel, bool desired, uint32_t set)
             bytes[i / 8] = (uint8_t)(bytes[i / 8] | (0x80u >> (i % 8)));
         }
     }
-    const pdcp_reply_t reply = {
-        .param = desired ? PDCP_CH_DESIRED : PDCP_CH_REQUIRED, .bytes = bytes, .len = sizeof bytes};
-    pdcp_nodes_put_needs(&s->nodes, channel, &reply);
+    pdcp_nodes_put_needs(&s->nodes, channel, desired, 0, bytes, sizeof bytes);
 }
 
 void systems_set_up(systems_t *s, uint8_t place, const systems_device_t *device)

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "hostlink.h"
+#include "pdcp_request.h"
 #include "unity.h"
 
 #define DEV_OUT 2, 0, 2, 0, 4, 0 /* 0002:0002:0004, id 11h, output 1 */

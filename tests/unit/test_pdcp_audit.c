@@ -3,6 +3,7 @@
 #include <string.h>
 
 #include "exchange.h"
+#include "pdcp_audit.h"
 #include "pdcp_bytes.h"
 #include "unity.h"
 

@@ -5,6 +5,7 @@
 #include <string.h>
 
 #include "exchange.h"
+#include "pdcp_link.h"
 #include "unity.h"
 
 static exchange_t x;

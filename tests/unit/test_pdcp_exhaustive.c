@@ -6,6 +6,7 @@
 
 #include "exchange.h"
 #include "pdcp_device.h"
+#include "pdcp_request.h"
 #include "unity.h"
 
 #ifdef __AVR__

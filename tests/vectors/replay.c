@@ -9,6 +9,8 @@
 #include <string.h>
 
 #include "pdcp_arb.h"
+#include "pdcp_bind.h"
+#include "pdcp_link.h"
 
 #define CLOCK_MS 0xFFFFF000uL /* the arbitrator's clock at the log's 0: it wraps after four seconds */
 

@@ -1,0 +1,42 @@
+/* State of an arbitrator: all of it hangs from pdcp_arb_t. Its users include pdcp_arb.h.
+ *
+ *   member                                    who writes it
+ *   host                                      pdcp_host
+ *   bus                                       pdcp_bus.h says who
+ *   standby                                   pdcp_standby
+ *   held_ms, asked_ms                         pdcp_hold
+ *   silent, listening                         pdcp_role, which sets the times afresh when it begins
+ *   beacon_ms, restart, recovery              pdcp_arb */
+#ifndef PDCP_ARB_STATE_H
+#define PDCP_ARB_STATE_H
+
+#include <stdbool.h>
+#include <stdint.h>
+
+#include "pdcp_bus.h"
+#include "pdcp_host.h"
+#include "pdcp_recovery.h"
+#include "pdcp_standby.h"
+
+typedef struct {
+    uint32_t asked_ms;  /* when a device asked to bind last, or the start */
+    uint32_t beacon_ms; /* when its last beacon left */
+    uint32_t serial;
+    uint16_t
+        held_ms; /* the first grants were held for so long: taken off the start-up's quiet time (D-BUS-34) */
+    bool silent; /* on standby (D-BUS-42) */
+    bool listening; /* its beacons did not leave for too long: it sends nothing for a while (D-BUS-42) */
+    bool restart;   /* the controller is to be restarted */
+    pdcp_host_request_t host;
+    pdcp_bus_t bus;
+    pdcp_recovery_t recovery;
+    pdcp_standby_t standby;
+} pdcp_arb_t;
+
+/* The device at this place, which must be one. */
+static inline pdcp_node_t *pdcp_arb_device(pdcp_arb_t *arb, uint8_t node)
+{
+    return pdcp_bus_node(&arb->bus, node);
+}
+
+#endif

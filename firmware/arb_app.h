@@ -54,8 +54,8 @@ void arb_app_on_state(arb_app_t *app, uint32_t now_ms, pdcp_bus_state_t state);
 /* The controller's error counters, for the host; to be told before the state. */
 void arb_app_on_errors(arb_app_t *app, uint8_t transmit, uint8_t receive);
 
-/* The host has closed its end, where that can be seen: the next one gets no events unless it asks for them.
- */
+/* The host has closed its end, where that can be seen: the next one gets no events unless it asks for
+ * them. */
 void arb_app_on_host_gone(arb_app_t *app);
 
 /* Bytes from the host. Returns how many were taken; the rest is offered again after the next step. */

@@ -94,8 +94,8 @@ static inline bool profile_tlv_has(const uint8_t set[PROFILE_TLV_SET_BYTES], uin
 }
 
 /* Does a link name this device? Now and then it is said of one that no link names: of one in eight when
- * sixteen are named.
- */
+ * sixteen are
+ * named. */
 bool profile_tlv_names(const uint8_t names[PROFILE_TLV_NAMES_BYTES], const pdcp_identity_t *identity);
 
 /* Writer ------------------------------------------------------------------------------------------------- */

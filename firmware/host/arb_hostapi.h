@@ -29,8 +29,8 @@ static inline bool arb_hostapi_wants_frames(const arb_hostapi_t *api)
     return arb_hostevents_wants(&api->events, ARB_EVENT_FRAME);
 }
 
-/* A frame on the bus, received or sent, for a host that wants them: handed over at once if the host has room.
- */
+/* A frame on the bus, received or sent, for a host that wants them: handed over at once if the host has
+ * room. */
 void arb_hostapi_on_frame(arb_hostapi_t *api, const arb_port_t *port, uint32_t now_ms,
                           const can_frame_t *frame);
 

@@ -59,8 +59,8 @@ bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request);
 /* Forgets what is not a whole message yet; it counts as garbage. */
 void arb_hostrx_clear(arb_hostrx_t *rx);
 
-/* Is a message under way, so that arb_hostrx_on_time is to be called at rx->last_ms + ARB_HOSTRX_TIMEOUT_MS?
- */
+/* Is a message under way, so that arb_hostrx_on_time is to be called at rx->last_ms +
+ * ARB_HOSTRX_TIMEOUT_MS? */
 static inline bool arb_hostrx_is_inside(const arb_hostrx_t *rx)
 {
     return rx->len != 0;

@@ -28,8 +28,8 @@
 #include "pdcp_time.h"
 #include "profile_tlv.h"
 
-/* Pages that a string may take in a small memory: its share of what the others leave, without the header's.
- */
+/* Pages that a string may take in a small memory: its share of what the others leave, without the
+ * header's. */
 #define ARB_CONFIG_STRING_PAGES                                                                              \
     ((ARB_NVM_PAGES - ARB_AREAS * (int)(ARB_STORE_AREA / ARB_PORT_NVM_PAGE) - ARB_AREAS) / ARB_AREAS - 1)
 

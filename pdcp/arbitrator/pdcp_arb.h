@@ -4,8 +4,8 @@
  * wait to be sent with pdcp_arb_tx_peek and pdcp_arb_tx_pop. Everything is single-threaded; several
  * arbitrators fit one process. now_ms may stand still but never runs backwards; it wraps (pdcp_time.h).
  *
- * The tables may be read at any time (arb->bus.nodes, arb->bus.stats); only the functions here change them.
- */
+ * The tables may be read at any time (arb->bus.nodes, arb->bus.stats); only the functions here change
+ * them. */
 #ifndef PDCP_ARB_H
 #define PDCP_ARB_H
 

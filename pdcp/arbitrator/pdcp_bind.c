@@ -152,8 +152,8 @@ static uint8_t unheard_id(const pdcp_bus_t *bus)
 }
 
 /* The first free and quiet id from this one on that nobody is remembered with; while there is none, that of
- * the identity that was away longest; else the one that was unheard longest. step: 1 or -1. 0: none is left.
- */
+ * the identity that was away longest; else the one that was unheard longest. step: 1 or -1. 0: none is
+ * left. */
 static uint8_t pick_id(const pdcp_bus_t *bus, uint8_t id, int8_t step)
 {
     for (uint8_t left = PDCP_NODE_MAX; left > 0; left--) {

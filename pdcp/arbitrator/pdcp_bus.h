@@ -27,9 +27,8 @@ typedef enum {
     PDCP_EVENT_SILENT,  /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
     PDCP_EVENT_STARTED, /* and has started afresh */
     PDCP_EVENT_STATE,   /* the bus has another state; status holds it (pdcp_bus_state_t) */
-    PDCP_EVENT_AUDIT,  /* channel: a parameter of it was not as the tables say; status holds its id (D-BUS-40)
-                        */
-    PDCP_EVENT_REQUEST /* node: the host's request has ended with status; len bytes of value */
+    PDCP_EVENT_AUDIT,   /* channel: a parameter differs from the tables; status holds its id (D-BUS-40) */
+    PDCP_EVENT_REQUEST  /* node: the host's request has ended with status; len bytes of value */
 } pdcp_event_kind_t;
 
 typedef struct {

@@ -51,8 +51,8 @@ static void bind(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked
     }
 }
 
-/* An arbitrator without devices of its own lets another one go first. Without a place the device asks again.
- */
+/* An arbitrator without devices of its own lets another one go first. Without a place the device asks
+ * again. */
 static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
 {
     const uint8_t place = pdcp_nodes_free_place(&arb->bus.nodes);

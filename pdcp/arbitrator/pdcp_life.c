@@ -20,8 +20,8 @@ void pdcp_life_set(pdcp_arb_t *arb, uint8_t node, uint16_t in_ms)
     pdcp_bus_wake(&arb->bus, (uint8_t)(PDCP_TIMER_LIFE + node), in_ms);
 }
 
-/* The beacon interval of a device may have become shorter: the deadline moves by itself only when it fires.
- */
+/* The beacon interval of a device may have become shorter: the deadline moves by itself only when it
+ * fires. */
 void pdcp_life_expect(pdcp_arb_t *arb, uint8_t node)
 {
     pdcp_life_set(arb, node, silence_ms(pdcp_arb_device(arb, node)));
@@ -232,8 +232,8 @@ static void hand_on(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 void pdcp_life_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply)
 {
     const pdcp_status_t status = (pdcp_status_t)reply->status;
-    /* Silence shows nothing when a question was asked once, or is one that no device need answer (D-BUS-41).
-     */
+    /* Silence shows nothing when a question was asked once, or is one that no device need answer
+     * (D-BUS-41). */
     const bool counts = status != PDCP_ERR_NO_ANSWER ||
                         (reply->client != PDCP_CLIENT_AUDIT && reply->client != PDCP_CLIENT_RAW);
     if (reply->done && counts && pdcp_arb_device(arb, node)->asked_again &&

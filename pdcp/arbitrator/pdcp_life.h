@@ -15,8 +15,8 @@
 /* Sets a device's deadline: it is lost, forgotten, or its held bind request is answered then. */
 void pdcp_life_set(pdcp_arb_t *arb, uint8_t node, uint16_t in_ms);
 
-/* The beacon interval of a device may have become shorter: the deadline moves by itself only when it fires.
- */
+/* The beacon interval of a device may have become shorter: the deadline moves by itself only when it
+ * fires. */
 void pdcp_life_expect(pdcp_arb_t *arb, uint8_t node);
 
 /* A bind request of a device was answered. If it was granted, the setup begins afresh. */

@@ -155,8 +155,8 @@ bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
 void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
                           const uint8_t *bytes, uint16_t len);
 
-/* Does channel need (or desire) the input with this index of its own device, which must have room for needs?
- */
+/* Does channel need (or desire) the input with this index of its own device, which must have room for
+ * needs? */
 bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index);
 
 /* No input is fed by this channel any more: it is gone, or no output now. */

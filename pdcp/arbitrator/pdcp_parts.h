@@ -9,8 +9,8 @@
  *   pdcp_bind_t       pdcp_bind      the application fills in what is remembered, pdcp_bind_remember_stored
  *   pdcp_link_t       pdcp_link      pdcp_arb writes planned, stored and due
  *   pdcp_audit_t      pdcp_audit
- *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is forgotten
- */
+ *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is
+ * forgotten */
 #ifndef PDCP_PARTS_H
 #define PDCP_PARTS_H
 

@@ -17,8 +17,8 @@ enum {
     PDCP_RELEASE_AGAIN_MS = 1000 /* until a device that did not answer is told again */
 };
 
-/* The host has sent Suspend, for time_ms, 0: until released, or Release; to a device or (PDCP_NONE) to all.
- */
+/* The host has sent Suspend, for time_ms, 0: until released, or Release; to a device or (PDCP_NONE) to
+ * all. */
 void pdcp_suspend_on_host(pdcp_bus_t *bus, uint8_t node, uint8_t code, uint16_t time_ms);
 
 /* A device was bound: it is not suspended. */

@@ -29,8 +29,8 @@
 #define PDCP_RESERVED_MAX 8 /* suggested ids waiting for their device (D-BUS-6) */
 #endif
 
-/* Bytes for required and desired channels: one bit for each input of the owning device, two sets a channel.
- */
+/* Bytes for required and desired channels: one bit for each input of the owning device, two sets a
+ * channel. */
 #ifndef PDCP_NEEDS_BYTES
 #define PDCP_NEEDS_BYTES 320
 #endif

@@ -23,8 +23,8 @@ typedef enum {
 
 void pdcp_txq_init(pdcp_txq_t *txq);
 
-/* Copies the frame in. A full queue takes it only if it is more urgent than the frame that would leave last.
- */
+/* Copies the frame in. A full queue takes it only if it is more urgent than the frame that would leave
+ * last. */
 pdcp_txq_put_t pdcp_txq_put(pdcp_txq_t *txq, const can_frame_t *frame);
 
 /* The frame that leaves next, NULL when there is none. Valid until the queue is changed. */

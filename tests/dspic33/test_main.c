@@ -1,6 +1,6 @@
 /* The whole arbitrator as it runs on the part: main_dspic33.c with all drivers, against fake registers.
- * Devices are pdcp_device on the other end of the controller; the host sends bytes and reads what comes back.
- */
+ * Devices are pdcp_device on the other end of the controller; the host sends bytes and reads what comes
+ * back. */
 #include <setjmp.h>
 #include <string.h>
 #include <xc.h>

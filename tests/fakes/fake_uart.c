@@ -1,5 +1,5 @@
-/* UART 1: four bytes of receive buffer with their error bits, four of transmit buffer and a shift register.
- */
+/* UART 1: four bytes of receive buffer with their error bits, four of transmit buffer and a shift
+ * register. */
 #include <string.h>
 #include <xc.h>
 

@@ -152,8 +152,8 @@ static void check_taken(const flood_t *flood)
     }
 }
 
-/* --- Time: from one event of the world to the next, so that every frame is seen while it is on the wire ---
- */
+/* --- Time: from one event of the world to the next, so that every frame is seen while it is on the wire
+ * --- */
 
 static uint64_t step_world(flood_t *flood, uint64_t to_us)
 {

@@ -1,6 +1,6 @@
 /* flood [--json] [ROW...]: measures the rows of the flood table, all of them without names.
- * flood --check [--all] [ROW...]: each row is a test; those that await something are skipped without --all.
- */
+ * flood --check [--all] [ROW...]: each row is a test; those that await something are skipped without
+ * --all. */
 #include <stdio.h>
 #include <string.h>
 

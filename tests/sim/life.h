@@ -1,5 +1,5 @@
-/* Random lives of a whole limb in virtual time, for test_life.c: what its parts share. One seed is one life.
- */
+/* Random lives of a whole limb in virtual time, for test_life.c: what its parts share. One seed is one
+ * life. */
 #ifndef LIFE_H
 #define LIFE_H
 

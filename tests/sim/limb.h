@@ -63,8 +63,8 @@ struct limb {
 /* An arbitrator with a blank memory, its clock at clock_ms, and no parts. */
 void limb_begin(limb_t *limb, uint32_t seed, uint32_t clock_ms);
 
-/* The same with the parts of acceptance system 2, plugged in, and an arbitrator that makes no links unasked.
- */
+/* The same with the parts of acceptance system 2, plugged in, and an arbitrator that makes no links
+ * unasked. */
 void limb_start(limb_t *limb, uint32_t seed, uint32_t clock_ms);
 void limb_end(limb_t *limb);
 

@@ -58,8 +58,8 @@ static void suspend_all(void)
     send(&frame);
 }
 
-/* A device's own idea of the source of an input, without a word to anybody; written as the arbitrator would.
- */
+/* A device's own idea of the source of an input, without a word to anybody; written as the arbitrator
+ * would. */
 static void name_source(int part, uint8_t channel, uint16_t sn, uint8_t index)
 {
     const uint16_t id = pdcp_can_id(PDCP_PRIORITY_NORMAL, true, pdcp_device_node_id(device(part)));
@@ -222,8 +222,8 @@ static void test_a_suspend_of_the_host(void)
     TEST_ASSERT_FALSE(pdcp_device_suspended(device(D3)));
 }
 
-/* No frame of data is lost by a repair of what is only wrong in the node id of another device, or in names.
- */
+/* No frame of data is lost by a repair of what is only wrong in the node id of another device, or in
+ * names. */
 static void test_a_repair_costs_no_data(void)
 {
     begin_system_2();

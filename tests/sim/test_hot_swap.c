@@ -367,8 +367,8 @@ static int links_of_second(void)
     return count;
 }
 
-/* The second one keeps its hands off, takes the limb over as it is when the first one is gone, and so back.
- */
+/* The second one keeps its hands off, takes the limb over as it is when the first one is gone, and so
+ * back. */
 static void test_a_standby_takes_the_limb_over(void)
 {
     run_limb();
@@ -494,8 +494,8 @@ static void test_all_links_are_removed(void)
     TEST_ASSERT_EQUAL(0, limb_act(&limb, ARB_ACTION_AUTOCONFIGURE, 0));
 }
 
-/* Both controllers remember the same sensor and ask for it; they have one each in turn with the other absent.
- */
+/* Both controllers remember the same sensor and ask for it; they have one each in turn with the other
+ * absent. */
 static void remember_both(void)
 {
     for (int i = 0; i < 2; i++) {

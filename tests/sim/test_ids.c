@@ -1,5 +1,5 @@
-/* Node ids in whole limbs: nobody hears whom it should not, and nobody is kept waiting (D-BUS-36, D-BUS-37).
- */
+/* Node ids in whole limbs: nobody hears whom it should not, and nobody is kept waiting (D-BUS-36,
+ * D-BUS-37). */
 #include <stdio.h>
 #include <string.h>
 

@@ -860,8 +860,8 @@ static void test_a_mute_device_holds_up_nobody(void)
     limb_end(limb);
 }
 
-/* An action of the host before the start-up does not take its place: what is stored is loaded all the same.
- */
+/* An action of the host before the start-up does not take its place: what is stored is loaded all the
+ * same. */
 static void test_an_action_does_not_forestall_the_start_up(void)
 {
     static const arb_action_t actions[] = {ARB_ACTION_AUTOCONFIGURE, ARB_ACTION_CLEAR, ARB_ACTION_ENFORCE,

@@ -83,8 +83,8 @@ static void name_source(int part, uint8_t vid, uint8_t pid)
     send(&frame);
 }
 
-/* The input 2.1 has lost its link to part 1, whose input stands in for it and is required by now. It is back.
- */
+/* The input 2.1 has lost its link to part 1, whose input stands in for it and is required by now. It is
+ * back. */
 static void make_stand_in(const char *stand_in)
 {
     (void)limb_add(&limb, 1, stand_in);

@@ -78,8 +78,8 @@ static void test_system_4_power_on(void)
     power_on(4);
 }
 
-/* The devices lived on while the arbitrator was away: their outputs get no ids in its first 11 s (D-BUS-36).
- */
+/* The devices lived on while the arbitrator was away: their outputs get no ids in its first 11 s
+ * (D-BUS-36). */
 enum { SHUT_WAIT_MS = PDCP_SHUT_MS + 2000 };
 
 /* The blank arbitrator must not make up the links: it reads them back from the devices. */

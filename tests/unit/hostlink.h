@@ -5,8 +5,8 @@
 
 #include "exchange.h"
 
-/* A fresh application with this host, at now_ms 0xFFFFFF00. Its memory is empty; it makes no links by itself.
- */
+/* A fresh application with this host, at now_ms 0xFFFFFF00. Its memory is empty; it makes no links by
+ * itself. */
 void hostlink_start(exchange_t *x, arb_app_t *app, bool strict);
 
 /* The line takes so many more bytes, and then none; from the start: without end. */

@@ -279,8 +279,8 @@ static void test_what_is_not_known_survives_a_save_of_another_configuration(void
     EXPECT(99, 1, 2, 1, 2, 0, 98, 3, 4, 2, 4, 0, 3, 0, 0, 2, 5, 0, 3, 0, 0, 15, 0, 0);
 }
 
-/* The host may store a string that does not say that it has no configurations, or one with bytes behind it.
- */
+/* The host may store a string that does not say that it has no configurations, or one with bytes behind
+ * it. */
 static void test_odd_strings_are_kept_until_something_is_saved(void)
 {
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, WRITE(15, 0, 0));

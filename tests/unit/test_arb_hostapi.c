@@ -280,8 +280,8 @@ static void test_passthrough_to_all_on_standby(void)
     exchange_silence(&x);
 }
 
-/* D-API-11: node ids are given by the arbitrator, the source of an input that has a link is written by 2307h.
- */
+/* D-API-11: node ids are given by the arbitrator, the source of an input that has a link is written by
+ * 2307h. */
 static void test_parameters_that_are_the_arbitrators(void)
 {
     add_devices();

@@ -1,5 +1,5 @@
-/* The event stream (2416h, 2419h; D-API-5): what is told, in which bytes, and that answers never wait for it.
- */
+/* The event stream (2416h, 2419h; D-API-5): what is told, in which bytes, and that answers never wait for
+ * it. */
 #include <string.h>
 
 #include "hostlink.h"

@@ -311,8 +311,8 @@ static void test_save_and_what_the_info_says(void)
 
 /* --- 2410h --- */
 
-/* The host writes a string without the active configuration: it is not active any more, and decides nothing.
- */
+/* The host writes a string without the active configuration: it is not active any more, and decides
+ * nothing. */
 static void test_the_active_configuration_is_written_away(void)
 {
     ask(0x2407, BYTES(1, 0));
@@ -434,8 +434,8 @@ static void test_the_device_goes_while_its_link_is_removed(void)
     hostlink_silence();
 }
 
-/* A device that answers, but each write only when it comes the third time: the host has its answer after 3 s.
- */
+/* A device that answers, but each write only when it comes the third time: the host has its answer after 3
+ * s. */
 static void test_a_link_is_removed_too_slowly(void)
 {
     make_link();

@@ -183,8 +183,8 @@ static void test_kinds_of_frames(void)
 
 /* --- health --- */
 
-/* An error frame: classes in the identifier, what the controller says in byte 1, counters in bytes 6 and 7.
- */
+/* An error frame: classes in the identifier, what the controller says in byte 1, counters in bytes 6 and
+ * 7. */
 static void note(uint16_t classes, uint8_t controller, uint8_t tx, uint8_t rx, hal_can_health_t *health)
 {
     const uint8_t bytes[20] = {0xFF,

@@ -369,8 +369,8 @@ static void test_small_rooms_get_everything_without_new_bytes(void)
     TEST_ASSERT_EQUAL_INT(calls, ready_calls);
 }
 
-/* Reads what the client has sent, and checks that it is the frames first_number onwards, whole and in order.
- */
+/* Reads what the client has sent, and checks that it is the frames first_number onwards, whole and in
+ * order. */
 static unsigned read_numbered(char *rest, size_t rest_size, unsigned number)
 {
     static char bytes[1 << 16];

@@ -138,8 +138,8 @@ static void expect_silence_at_host(int host)
 
 static void test_bytes_pass_unchanged_in_both_directions(void)
 {
-    /* What a terminal that is not raw would change: carriage return, line feed, ^C, ^D, ^S, erase, 8th bit.
-     */
+    /* What a terminal that is not raw would change: carriage return, line feed, ^C, ^D, ^S, erase, 8th
+     * bit. */
     const char text[] = "a\r\n\x03\x04\x13\x11\x7F\xFF\x1A|";
     open_uart("pty");
     int host = open_host();

@@ -923,8 +923,8 @@ static void test_a_source_in_its_setup_is_not_there_yet(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(0, 1)->link);
 }
 
-/* Its own output (D-API-6), an output and an input that are none, and channel index 0, which is the device.
- */
+/* Its own output (D-API-6), an output and an input that are none, and channel index 0, which is the
+ * device. */
 static void test_sources_that_cannot_be(void)
 {
     add_two();
@@ -1040,8 +1040,8 @@ static void test_an_input_waits_for_its_source(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(1, 1)->link);
 }
 
-/* What was the source is an input when its device comes back: not linked, and the output's node id is free.
- */
+/* What was the source is an input when its device comes back: not linked, and the output's node id is
+ * free. */
 static void test_a_source_that_comes_back_as_an_input(void)
 {
     add_two_linked();

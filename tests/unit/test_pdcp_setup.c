@@ -79,8 +79,8 @@ static void test_everything_is_read_and_written_in_order(void)
     TEST_ASSERT_EQUAL(PDCP_OUTPUT, nodes->channels[third].transfer);
     TEST_ASSERT_EQUAL(0xFE, nodes->channels[third].node_id);
 
-    /* D-BUS-8: bit 7 of the first byte is channel index 0; D-BUS-13: only bits of inputs that exist are kept.
-     */
+    /* D-BUS-8: bit 7 of the first byte is channel index 0; D-BUS-13: only bits of inputs that exist are
+     * kept. */
     TEST_ASSERT_TRUE(pdcp_nodes_needs(nodes, first, false, 2));
     TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, first, false, 1));
     TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, first, true, 2));
@@ -363,8 +363,8 @@ static void test_a_device_is_lost_and_later_forgotten(void)
     TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0xFE]);
 }
 
-/* A device with a beacon interval of 100 ms that stops right after its binding: gone after 300 ms, not 1500.
- */
+/* A device with a beacon interval of 100 ms that stops right after its binding: gone after 300 ms, not
+ * 1500. */
 static void test_a_short_beacon_interval_counts_at_once(void)
 {
     static const exchange_pair_t pairs[] = {

@@ -67,8 +67,8 @@ static void expect_table(pdcp_link_status_t link, uint16_t sn, uint8_t index)
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK)); /* no link has changed */
 }
 
-/* The stored configuration decides, and the answer says whether the channel is connected now (pdcp-bus.md 7).
- */
+/* The stored configuration decides, and the answer says whether the channel is connected now (pdcp-bus.md
+ * 7). */
 static void test_a_device_that_names_another_source_is_told_its_own(void)
 {
     exchange_make_link(&x);

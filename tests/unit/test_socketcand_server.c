@@ -658,8 +658,8 @@ static void test_socketcand_server_hold_ends_with_the_next_element(void)
     TEST_ASSERT_LESS_THAN_UINT64(SOCKETCAND_HOLD_MS * 500, best_us);
 }
 
-/* Two elements in two writes: a client without TCP_NODELAY sends the second when the first is acknowledged.
- */
+/* Two elements in two writes: a client without TCP_NODELAY sends the second when the first is
+ * acknowledged. */
 static void test_socketcand_server_does_not_delay_acknowledgements(void)
 {
     uint64_t best_us = UINT64_MAX;

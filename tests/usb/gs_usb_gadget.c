@@ -11,8 +11,8 @@
  *
  *     report | bus-off | bus-off-after ECHOES | errors TX RX | overflow
  *
- * bus-off-after: when so many frames of the host have gone out since the start, whenever that is.
- */
+ * bus-off-after: when so many frames of the host have gone out since the start, whenever that
+ * is. */
 #include <errno.h>
 #include <fcntl.h>
 #include <inttypes.h>

@@ -52,11 +52,6 @@ void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
     }
 }
 
-void pdcp_audit_on_change(pdcp_bus_t *bus)
-{
-    bus->audit.asked = PDCP_NONE;
-}
-
 /* --- Questions --- */
 
 static bool is_output(const pdcp_channel_t *channel)
@@ -112,6 +107,7 @@ static bool may_ask(pdcp_bus_t *bus, uint8_t node)
 static void ask(pdcp_bus_t *bus, uint8_t number, uint8_t kind)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    bus->link.changed = false;
     bus->audit.asked = number;
     bus->audit.asked_kind = kind;
     bus->audit.asked_place = channel->node;
@@ -281,8 +277,8 @@ static void on_difference(pdcp_bus_t *bus, uint8_t number)
 void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     const uint8_t number = bus->audit.asked;
-    if (number == PDCP_NONE || reply->status == PDCP_ERR_NO_ANSWER) {
-        return;
+    if (number == PDCP_NONE || bus->link.changed || reply->status == PDCP_ERR_NO_ANSWER) {
+        return; /* the tables may say something else than when it was asked */
     }
     bus->audit.asked = PDCP_NONE;
     if (reply->status != PDCP_OK) {

@@ -10,7 +10,7 @@
  * What differs is counted, told (PDCP_EVENT_AUDIT) and repaired: a link is written again (pdcp_link_write), a
  * channel without one is silenced. After three repairs of one link within a minute it becomes inactive when
  * it differs again; what an input names as its source is then only told. Silence and refusal are no
- * differences. */
+ * differences. An answer is not compared if a link has changed since the question (pdcp_link_t, changed). */
 #ifndef PDCP_AUDIT_H
 #define PDCP_AUDIT_H
 
@@ -35,9 +35,6 @@ void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node);
 
 /* Somebody else has spoken to the device with this node id in the name of an arbitrator: it goes first. */
 void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id);
-
-/* A link changes, or is about to: the answer to the question under way is not compared. */
-void pdcp_audit_on_change(pdcp_bus_t *bus);
 
 /* PDCP_TIMER_AUDIT is due; calm: nothing else is to be done, so a question may be asked. */
 void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm);

@@ -3,7 +3,6 @@
 #include <stddef.h>
 #include <string.h>
 
-#include "pdcp_audit.h"
 #include "pdcp_bind.h"
 #include "pdcp_bytes.h"
 
@@ -73,7 +72,7 @@ static void put_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
         drop_todo(channel, SILENCES);
     }
     bus->link.due = true;
-    pdcp_audit_on_change(bus);
+    bus->link.changed = true;
 }
 
 /* The output that an input names as its source, if its device is set up; an unconnected input names none. */
@@ -296,7 +295,7 @@ static void name_source(pdcp_bus_t *bus, pdcp_channel_t *input)
  * steps backwards, and leaves out those that its channels do not have. */
 static void begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t output)
 {
-    pdcp_audit_on_change(bus);
+    bus->link.changed = true;
     bus->link.active = true;
     bus->link.at = PDCP_NONE;
     bus->link.kind = (uint8_t)kind;

@@ -7,10 +7,10 @@
  *   struct            its part       besides
  *   pdcp_request_t    pdcp_request
  *   pdcp_bind_t       pdcp_bind      the application fills in what is remembered, pdcp_bind_remember_stored
- *   pdcp_link_t       pdcp_link      pdcp_arb writes planned, stored and due
+ *   pdcp_link_t       pdcp_link      pdcp_arb writes planned, stored and due, pdcp_audit clears changed
  *   pdcp_audit_t      pdcp_audit
- *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is
- * forgotten */
+ *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is forgotten
+ */
 #ifndef PDCP_PARTS_H
 #define PDCP_PARTS_H
 
@@ -107,6 +107,7 @@ typedef struct {
     bool planned;    /* the profile layer decides which links are made: none comes by itself */
     bool stored;     /* and from a stored configuration: Update Data Channel changes no table */
     bool due;        /* some channel has something to do */
+    bool changed;    /* a link changes, or is about to: whoever wants to know sets this to false before */
     bool closed;     /* the arbitrator has just started: no output is enabled (D-BUS-36) */
     bool active;     /* a job is under way */
     bool undoing;    /* steps run backwards */
@@ -165,7 +166,7 @@ typedef struct {
     bool on;             /* it was begun */
     bool asleep;         /* no device is ready: the timer does not run */
     uint8_t count;       /* of questions */
-    uint8_t asked;       /* channel number of the question under way; PDCP_NONE: its answer is not compared */
+    uint8_t asked;       /* channel number of the question under way; PDCP_NONE: none, or it was compared */
     uint8_t asked_kind;  /* pdcp_audit_kind_t of the question */
     uint8_t asked_place; /* of the device that was asked last */
     uint8_t first;       /* place of the device that goes first, or did last */

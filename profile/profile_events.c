@@ -159,7 +159,7 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     if (dropping) {
         return;
     }
-    if (link == PDCP_LINK_NONE && arb->bus.link.kind == PDCP_TODO_REMOVE) {
+    if (link == PDCP_LINK_NONE && arb->bus.link.job.kind == PDCP_TODO_REMOVE) {
         on_removed(run, input, entry);
     } else if (is_broken(run, input)) {
         on_broken(run, input);

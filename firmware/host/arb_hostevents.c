@@ -59,14 +59,14 @@ static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t
 static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t number)
 {
     const pdcp_channel_t *input = &arb->bus.nodes.channels[number];
-    const pdcp_link_t *job = &arb->bus.link;
+    const pdcp_job_t *job = &arb->bus.link.job;
     uint8_t *data = put(events, now_ms, ARB_EVENT_LINK, ARB_EVENT_DATA_MAX);
     if (data == NULL) {
         return;
     }
     arb_hostcodec_put_link(data, &arb->bus.nodes, input);
     if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
-        arb_hostcodec_put_channel(data, &job->old_source, job->old_index);
+        arb_hostcodec_put_channel(data, &job->old.identity, job->old.index);
     }
 }
 

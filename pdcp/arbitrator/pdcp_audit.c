@@ -4,6 +4,7 @@
 
 #include "pdcp_bus.h"
 #include "pdcp_bytes.h"
+#include "pdcp_ends.h"
 #include "pdcp_link.h"
 
 enum {
@@ -74,7 +75,7 @@ static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
     if (!is_output(channel)) {
         return channel->link == PDCP_LINK_ACTIVE;
     }
-    return channel->enabled && pdcp_link_listener(bus, number) != PDCP_NONE;
+    return channel->enabled && pdcp_ends_listener(bus, number) != PDCP_NONE;
 }
 
 /* Is the input to be asked what it names as its source? Without a link it must name none, which parameter 6
@@ -248,7 +249,7 @@ static void let_go(pdcp_bus_t *bus, uint8_t number, uint8_t input)
 {
     while (input != PDCP_NONE) {
         pdcp_link_rest(bus, input, PDCP_ERR_DIFFERS);
-        input = pdcp_link_listener(bus, number);
+        input = pdcp_ends_listener(bus, number);
     }
 }
 
@@ -259,7 +260,7 @@ static void on_difference(pdcp_bus_t *bus, uint8_t number)
     const uint8_t kind = bus->audit.asked_kind;
     const bool source = kind > PDCP_AUDIT_NODES;
     const bool linked = is_linked(bus, number);
-    const uint8_t input = is_output(channel) && linked ? pdcp_link_listener(bus, number) : number;
+    const uint8_t input = is_output(channel) && linked ? pdcp_ends_listener(bus, number) : number;
     const uint8_t times = count_difference(&bus->audit, input, source);
     pdcp_bus_count(bus, PDCP_STAT_AUDIT);
     if (times < TOO_MANY) {

@@ -1,9 +1,9 @@
 /* Links (pdcp-bus.md 7 and 8): one output feeds many inputs, an input has one source.
  *
- * The tables say how things should be (link, feed, todo); this file writes them to the devices, one job at a
- * time: make a link, remove one, silence an input whose source is lost or an output that nobody listens to,
- * resolve an Update Data Channel, write again what a device should have already. A link that cannot be made
- * is undone, in reverse. Its status is active only when its last write is answered. */
+ * The tables say how things should be (link, feed, todo), and this file makes the devices agree with them:
+ * what happens on the bus and what the host asks for is noted at the channels (pdcp_ends), and one job after
+ * the other (pdcp_job) carries the notes out, what silences first. The status of a link is active only when
+ * its last write is answered. */
 #ifndef PDCP_LINK_H
 #define PDCP_LINK_H
 
@@ -24,9 +24,6 @@ bool pdcp_link_is_making(const pdcp_bus_t *bus);
 /* Lets an active link rest: both ends disabled, source remembered (D-PRO-9). status: why, for
  * PDCP_EVENT_LINK. */
 void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input, pdcp_status_t status);
-
-/* An input that an active link feeds from this output; PDCP_NONE: there is none. */
-uint8_t pdcp_link_listener(const pdcp_bus_t *bus, uint8_t output);
 
 /* A channel without an active link was found enabled: it is told not to be, until it answers (D-BUS-22). */
 void pdcp_link_silence(pdcp_bus_t *bus, uint8_t channel);
@@ -65,9 +62,6 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node);
 
 /* A reply to a request of PDCP_CLIENT_LINK. */
 void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply);
-
-/* A channel has answered that its transfer is not enabled any more. */
-void pdcp_link_is_disabled(pdcp_bus_t *bus, pdcp_channel_t *channel);
 
 /* The first time after the start is over: outputs may be enabled. */
 void pdcp_link_open(pdcp_bus_t *bus);

@@ -7,7 +7,9 @@
  *   struct            its part       besides
  *   pdcp_request_t    pdcp_request
  *   pdcp_bind_t       pdcp_bind      the application fills in what is remembered, pdcp_bind_remember_stored
- *   pdcp_link_t       pdcp_link      pdcp_arb writes planned, stored and due, pdcp_audit clears changed
+ *   pdcp_link_t       pdcp_link      pdcp_arb writes planned, stored and due; pdcp_ends due and changed;
+ *                                    pdcp_job sets changed, pdcp_audit clears it
+ *   pdcp_job_t        pdcp_job       pdcp_link says when it is for the host
  *   pdcp_audit_t      pdcp_audit
  *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is forgotten
  */
@@ -101,14 +103,19 @@ typedef struct {
     pdcp_reserved_t reserved[PDCP_RESERVED_MAX];
 } pdcp_bind_t;
 
-/* --- Links (pdcp_link.h) --- */
+/* --- Links (pdcp_link.h, pdcp_job.h) --- */
 
+/* The source of an input: the output that its parameters 5, 6 and 8 name (D-BUS-7). */
 typedef struct {
-    bool planned;    /* the profile layer decides which links are made: none comes by itself */
-    bool stored;     /* and from a stored configuration: Update Data Channel changes no table */
-    bool due;        /* some channel has something to do */
-    bool changed;    /* a link changes, or is about to: whoever wants to know sets this to false before */
-    bool closed;     /* the arbitrator has just started: no output is enabled (D-BUS-36) */
+    pdcp_identity_t identity; /* of the output's device */
+    uint16_t type;
+    uint16_t profile;
+    uint8_t index; /* channel index; PDCP_NO_SOURCE_INDEX: the input is unconnected */
+    uint8_t feed;  /* channel number; PDCP_NONE: the output is not on the bus */
+} pdcp_source_t;
+
+/* The job under way, or the last one: what it was about stays readable until the next one begins. */
+typedef struct {
     bool active;     /* a job is under way */
     bool undoing;    /* steps run backwards */
     bool once;       /* the device that failed is tried once only */
@@ -117,23 +124,27 @@ typedef struct {
     bool differs;    /* what it names as its source is not what the tables say */
     uint8_t at;      /* place of the device whose answer the job waits for; PDCP_NONE: of none, the job goes
                         on when the device it is about has no other request under way */
-    uint8_t kind;    /* pdcp_todo_t of the job; PDCP_TODO_AGAIN: whatever comes interrupts it */
-    uint8_t step;    /* pdcp_link.c */
+    uint8_t kind;    /* pdcp_todo_t; PDCP_TODO_AGAIN: whatever comes interrupts it */
+    uint8_t step;    /* pdcp_step_t */
     uint8_t input;   /* channel number; PDCP_NONE: gone, or the job has none */
     uint8_t output;  /* channel number; PDCP_NONE: gone, or the job has none */
     bool output_was_on; /* before the job */
     int8_t status;      /* outcome so far, pdcp_status_t */
+    uint8_t old_link;   /* the input's link before the job, pdcp_link_status_t */
+    pdcp_source_t old;  /* the input's source before the job, to be restored when it fails */
+} pdcp_job_t;
+
+typedef struct {
+    bool planned; /* the profile layer decides which links are made: none comes by itself */
+    bool stored;  /* and from a stored configuration: Update Data Channel changes no table */
+    bool closed;  /* the arbitrator has just started: no output is enabled (D-BUS-36) */
+    bool due;     /* some channel has something to do */
+    bool changed; /* a link changes, or is about to: whoever wants to know sets this to false before */
     /* The link that the host or the planner has asked for; wish_input PDCP_NONE: none. */
     uint8_t wish_input;
     uint8_t wish_output;
     bool wish_sole; /* not if another input keeps it from the output */
-    /* The input's source before the job, to be restored when it fails. */
-    uint8_t old_index;
-    uint8_t old_link;
-    uint8_t old_feed;
-    pdcp_identity_t old_source;
-    uint16_t old_type;
-    uint16_t old_profile;
+    pdcp_job_t job;
 } pdcp_link_t;
 
 /* --- Audit (pdcp_audit.h) --- */

@@ -4,6 +4,7 @@
 
 #include "pdcp_bind.h"
 #include "pdcp_bytes.h"
+#include "pdcp_ends.h"
 #include "pdcp_link.h"
 
 typedef enum { PASS_DEVICE, PASS_SILENCE, PASS_DIRECTION, PASS_CHANNELS } pass_t;
@@ -275,7 +276,7 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
     case PDCP_CH_TRANSFER_TYPE:
         return take_direction(bus, number, (uint8_t)(low & 0xFFu));
     case PDCP_CH_ENABLED:
-        pdcp_link_is_disabled(bus, channel);
+        pdcp_ends_on_disabled(bus, channel);
         break;
     case PDCP_IN_TERMINAL_PROFILE:
         channel->terminal_profile = low;

@@ -58,6 +58,12 @@ static inline bool pdcp_codec_is_beacon(const can_frame_t *frame)
     return frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
 }
 
+/* The value of parameter 7 as one number: node id of the source's device, then that of the output. */
+static inline uint16_t pdcp_codec_node_ids(uint8_t device, uint8_t output)
+{
+    return (uint16_t)(device | (uint16_t)((uint16_t)output << 8));
+}
+
 /* Decodes the data of a frame that carries a function code. Accepts the sizes of both tables of the source
  * (D-BUS-3); an answer too short to hold its response code means success (D-BUS-18). On anything but
  * PDCP_DECODE_OK msg holds the code alone. */

@@ -160,9 +160,9 @@ static bool is_being_silenced(const limb_t *limb, uint8_t number)
 {
     const unsigned silences = (unsigned)PDCP_TODO_SILENCE | (unsigned)PDCP_TODO_REMOVE |
                               (unsigned)PDCP_TODO_CONNECT | (unsigned)PDCP_TODO_AGAIN;
-    const pdcp_link_t *job = &limb->app.arb.bus.link;
+    const pdcp_job_t *job = &limb->app.arb.bus.link.job;
     return (nodes_of(limb)->channels[number].todo & silences) != 0 ||
-           (job->active && (job->input == number || job->output == number || job->old_feed == number));
+           (job->active && (job->input == number || job->output == number || job->old.feed == number));
 }
 
 void life_check_silences(const limb_t *limb)

@@ -1,5 +1,6 @@
 /* Links (pdcp-bus.md 7, 8, 9): D-BUS-7, -10, -14, -19, -20, with hand-written frames. */
 #include "exchange.h"
+#include "pdcp_ends.h"
 #include "unity.h"
 
 static exchange_t x;
@@ -593,8 +594,7 @@ static void test_a_link_whose_source_has_gone_is_not_made(void)
     pdcp_channel_t *channel = &x.arb->bus.nodes.channels[input()];
     channel->link = PDCP_LINK_INACTIVE;
     channel->enabled = true;
-    channel->todo = PDCP_TODO_CONNECT;
-    x.arb->bus.link.due = true;
+    pdcp_ends_note(&x.arb->bus, input(), PDCP_TODO_CONNECT);
     exchange_step(&x);
     exchange_tx(&x, "312#04 04 01 00");
     TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_LINK)->channel);

@@ -69,7 +69,7 @@ static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
     const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
     const pdcp_channel_t *input = &nodes->channels[event->channel];
     const pdcp_identity_t *to = &nodes->nodes[input->node].identity;
-    const pdcp_identity_t *from = &input->source;
+    const pdcp_identity_t *from = &input->source.identity;
     const char *outcome = event->status == PDCP_OK ? "" : ", could not be made";
     if (input->link == PDCP_LINK_NONE) {
         say(daemon, PDCPD_LOG_INFO, "%u:%u:%u.%u is unlinked%s", to->vid, to->pid, to->sn, input->index,
@@ -77,7 +77,7 @@ static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
         return;
     }
     say(daemon, PDCPD_LOG_INFO, "%u:%u:%u.%u -> %u:%u:%u.%u is %s%s", from->vid, from->pid, from->sn,
-        input->source_index, to->vid, to->pid, to->sn, input->index,
+        input->source.index, to->vid, to->pid, to->sn, input->index,
         input->link == PDCP_LINK_ACTIVE ? "active" : "inactive", outcome);
 }
 

@@ -28,7 +28,8 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
             pdcp_arb_remember(arb, now_ms, input, owner, output->index, output->type, output->profile);
             return;
         }
-        original = output->index == channel->source_index && pdcp_identity_equal(owner, &channel->source);
+        original =
+            output->index == channel->source.index && pdcp_identity_equal(owner, &channel->source.identity);
     }
     if (channel->link == PDCP_LINK_NONE) {
         forget_source(run, arb, now_ms, input);
@@ -122,7 +123,7 @@ static uint8_t next_input(const profile_run_t *run)
         const pdcp_channel_t *channel = &nodes->channels[i];
         if (!profile_channel_is_ready(nodes, output, PDCP_OUTPUT) ||
             !profile_channel_is_ready(nodes, i, PDCP_INPUT) ||
-            (channel->link == PDCP_LINK_ACTIVE && channel->feed == output)) {
+            (channel->link == PDCP_LINK_ACTIVE && channel->source.feed == output)) {
             continue;
         }
         if (!profile_channel_is_terminal(channel)) {

@@ -31,7 +31,7 @@ uint8_t profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input)
 {
     const pdcp_channel_t *channel = &nodes->channels[input];
     return channel->link == PDCP_LINK_ACTIVE && profile_channel_is_ready(nodes, input, PDCP_INPUT)
-               ? channel->feed
+               ? channel->source.feed
                : PDCP_NONE;
 }
 
@@ -64,11 +64,11 @@ void profile_channel_end(const pdcp_nodes_t *nodes, uint8_t channel, profile_end
 bool profile_channel_named_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end)
 {
     const pdcp_channel_t *entry = &nodes->channels[input];
-    if (entry->source_index == PDCP_NO_SOURCE_INDEX || entry->source_index == 0) {
+    if (entry->source.index == PDCP_NO_SOURCE_INDEX || entry->source.index == 0) {
         return false;
     }
-    const uint8_t place = pdcp_nodes_find(nodes, &entry->source);
-    end->owner = entry->source;
+    const uint8_t place = pdcp_nodes_find(nodes, &entry->source.identity);
+    end->owner = entry->source.identity;
     end->owner_type = 0;
     end->owner_profile = 0;
     if (place != PDCP_NONE) {
@@ -76,8 +76,8 @@ bool profile_channel_named_source(const pdcp_nodes_t *nodes, uint8_t input, prof
         end->owner_type = owner->type;
         end->owner_profile = owner->profile;
     }
-    end->type = entry->source_type;
-    end->profile = entry->source_profile;
-    end->index = entry->source_index;
+    end->type = entry->source.type;
+    end->profile = entry->source.profile;
+    end->index = entry->source.index;
     return true;
 }

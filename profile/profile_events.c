@@ -55,7 +55,7 @@ static void on_broken(profile_run_t *run, uint8_t input)
     const pdcp_nodes_t *nodes = run->scene.nodes;
     run->plan.want[input] = PDCP_NONE;
     if (profile_channel_is_ready(nodes, input, PDCP_INPUT) &&
-        profile_channel_is_ready(nodes, nodes->channels[input].feed, PDCP_OUTPUT)) {
+        profile_channel_is_ready(nodes, nodes->channels[input].source.feed, PDCP_OUTPUT)) {
         run->tries = 1;
     }
     profile_run_make_due(run, run->at_events);
@@ -95,8 +95,9 @@ static void on_hosts_request_end(profile_run_t *run, const pdcp_event_t *event)
 /* Does the working link of an input differ from what the plan knows or wants? */
 static bool is_unexpected(const profile_run_t *run, uint8_t input)
 {
-    return run->making == PROFILE_MAKING ? profile_plan_links_differ(&run->plan, &run->scene)
-                                         : run->scene.nodes->channels[input].feed != run->plan.want[input];
+    return run->making == PROFILE_MAKING
+               ? profile_plan_links_differ(&run->plan, &run->scene)
+               : run->scene.nodes->channels[input].source.feed != run->plan.want[input];
 }
 
 /* A device has asked for the link of its input (Update Data Channel). The link may lack what it requires, so
@@ -109,7 +110,8 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
         (void)profile_active_adopt(run, input, false);
     }
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
-        pdcp_bit_set(run->scene.made, input, profile_channel_breaks_sole_access(nodes, channel->feed, input));
+        pdcp_bit_set(run->scene.made, input,
+                     profile_channel_breaks_sole_access(nodes, channel->source.feed, input));
         profile_run_make_due(run, run->at_events);
     }
 }
@@ -131,7 +133,7 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
  * disturbs a link must not get another limb by it (D-PRO-26). */
 static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 {
-    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].feed, .input = input};
+    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].source.feed, .input = input};
     run->plan.want[input] = PDCP_NONE;
     ban(run, now_ms, pair);
     profile_run_make_due(run, PROFILE_PLAN_SETTLE);

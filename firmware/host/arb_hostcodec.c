@@ -69,7 +69,7 @@ void arb_hostcodec_put_channel(uint8_t bytes[ARB_CHANNEL_BYTES], const pdcp_iden
 void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_nodes_t *nodes,
                             const pdcp_channel_t *input)
 {
-    arb_hostcodec_put_channel(&bytes[0], &input->source, input->source_index);
+    arb_hostcodec_put_channel(&bytes[0], &input->source.identity, input->source.index);
     arb_hostcodec_put_channel(&bytes[ARB_CHANNEL_BYTES], &nodes->nodes[input->node].identity, input->index);
     bytes[ARB_LINK_BYTES - 1] = input->link;
 }

@@ -443,10 +443,10 @@ void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pd
 {
     pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
     arb->bus.now_ms = now_ms;
-    channel->source = *owner;
-    channel->source_index = index;
-    channel->source_type = type;
-    channel->source_profile = profile;
+    channel->source.identity = *owner;
+    channel->source.index = index;
+    channel->source.type = type;
+    channel->source.profile = profile;
     channel->link = PDCP_LINK_INACTIVE;
     pdcp_link_write(&arb->bus, input);
     pdcp_bus_tell_link(&arb->bus, PDCP_EVENT_LINK, input, PDCP_OK);

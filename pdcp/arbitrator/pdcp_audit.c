@@ -83,7 +83,7 @@ static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
 static bool is_source_asked(const pdcp_channel_t *input, uint8_t kind)
 {
     return input->link != PDCP_LINK_NONE ||
-           (kind == PDCP_AUDIT_SERIAL && !pdcp_nodes_is_named(input->source_index));
+           (kind == PDCP_AUDIT_SERIAL && !pdcp_nodes_is_named(input->source.index));
 }
 
 /* Is this question asked on this walk? */
@@ -211,7 +211,7 @@ static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
         return first == channel->node_id;
     }
     if (bus->audit.asked_kind == PDCP_AUDIT_NODES) {
-        const pdcp_channel_t *source = &bus->nodes.channels[channel->feed];
+        const pdcp_channel_t *source = &bus->nodes.channels[channel->source.feed];
         return first == pdcp_bus_node(bus, source->node)->node_id &&
                pdcp_bytes_value_u8(reply->bytes, reply->len, 1) == source->node_id;
     }

@@ -20,11 +20,11 @@ bool pdcp_ends_is_ready(pdcp_bus_t *bus, uint8_t number)
 
 uint8_t pdcp_ends_source(const pdcp_bus_t *bus, const pdcp_channel_t *input)
 {
-    const uint8_t node = pdcp_nodes_find(&bus->nodes, &input->source);
+    const uint8_t node = pdcp_nodes_find(&bus->nodes, &input->source.identity);
     if (node == PDCP_NONE || node == input->node || bus->nodes.nodes[node].state != PDCP_NODE_READY) {
         return PDCP_NONE;
     }
-    const uint8_t channel = pdcp_nodes_channel(&bus->nodes, node, input->source_index);
+    const uint8_t channel = pdcp_nodes_channel(&bus->nodes, node, input->source.index);
     return channel != PDCP_NONE && bus->nodes.channels[channel].transfer == PDCP_OUTPUT ? channel : PDCP_NONE;
 }
 
@@ -32,7 +32,7 @@ uint8_t pdcp_ends_listener(const pdcp_bus_t *bus, uint8_t output)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &bus->nodes.channels[i];
-        if (input->feed == output && input->link == PDCP_LINK_ACTIVE) {
+        if (input->source.feed == output && input->link == PDCP_LINK_ACTIVE) {
             return i;
         }
     }

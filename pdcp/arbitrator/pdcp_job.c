@@ -10,21 +10,14 @@
 
 static void take_old(pdcp_job_t *job, const pdcp_channel_t *input)
 {
-    job->old.identity = input->source;
-    job->old.index = input->source_index;
-    job->old.type = input->source_type;
-    job->old.profile = input->source_profile;
-    job->old.feed = input->feed;
+    job->old = input->source;
     job->old_link = input->link;
 }
 
 static void give_back_old(const pdcp_job_t *job, pdcp_channel_t *input)
 {
-    input->source = job->old.identity;
-    input->source_index = job->old.index;
-    input->source_type = job->old.type;
-    input->source_profile = job->old.profile;
-    input->feed = PDCP_NONE;
+    input->source = job->old;
+    input->source.feed = PDCP_NONE;
     input->link = job->old_link != PDCP_LINK_NONE ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE; /* D-BUS-10 */
 }
 
@@ -33,11 +26,11 @@ static void name_source(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     pdcp_job_t *job = &bus->link.job;
     const pdcp_channel_t *output = &bus->nodes.channels[job->output];
-    input->source = pdcp_bus_node(bus, output->node)->identity;
-    input->source_index = output->index;
-    input->source_type = output->type;
-    input->source_profile = output->profile;
-    input->feed = job->output;
+    input->source = (pdcp_source_t){.identity = pdcp_bus_node(bus, output->node)->identity,
+                                    .type = output->type,
+                                    .profile = output->profile,
+                                    .index = output->index,
+                                    .feed = job->output};
     input->link = PDCP_LINK_INACTIVE;
     /* Enabled alone means only: may be. */
     job->output_was_on = pdcp_ends_listener(bus, job->output) != PDCP_NONE;
@@ -82,7 +75,7 @@ void pdcp_job_begin_write(pdcp_bus_t *bus, uint8_t input, bool for_device)
 {
     const pdcp_channel_t *channel = &bus->nodes.channels[input];
     const bool is_active = channel->link == PDCP_LINK_ACTIVE;
-    pdcp_job_begin(bus, PDCP_TODO_WRITE, input, is_active ? channel->feed : (uint8_t)PDCP_NONE);
+    pdcp_job_begin(bus, PDCP_TODO_WRITE, input, is_active ? channel->source.feed : (uint8_t)PDCP_NONE);
     if (for_device) {
         bus->link.job.for_device = true;
         bus->link.job.step = PDCP_STEP_READ_VID_PID;
@@ -108,7 +101,7 @@ static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
     if (input == NULL) {
         return;
     }
-    input->feed = input->link != PDCP_LINK_NONE ? pdcp_ends_source(bus, input) : PDCP_NONE;
+    input->source.feed = input->link != PDCP_LINK_NONE ? pdcp_ends_source(bus, input) : PDCP_NONE;
     if (job->old_link == PDCP_LINK_ACTIVE) {
         pdcp_ends_note(bus, job->input, PDCP_TODO_CONNECT);
     } else if (input->link == PDCP_LINK_INACTIVE && job->status == PDCP_ERR_NO_ANSWER && !bus->link.planned) {
@@ -134,7 +127,7 @@ static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
     }
     if (input != NULL && job->kind == PDCP_TODO_REMOVE) {
         input->link = PDCP_LINK_NONE;
-        input->feed = PDCP_NONE;
+        input->source.feed = PDCP_NONE;
         pdcp_ends_release(bus, job->old.feed);
     }
 }
@@ -255,11 +248,11 @@ static void resolve(pdcp_bus_t *bus)
     pdcp_job_t *job = &bus->link.job;
     pdcp_channel_t *input = pdcp_ends_channel(bus, job->input);
     job->output = pdcp_ends_source(bus, input);
-    if (input->link == PDCP_LINK_ACTIVE && job->output == input->feed) {
+    if (input->link == PDCP_LINK_ACTIVE && job->output == input->source.feed) {
         end(bus);
         return;
     }
-    input->link = pdcp_nodes_is_named(input->source_index) ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE;
+    input->link = pdcp_nodes_is_named(input->source.index) ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE;
     take_old(job, input);
     if (job->output == PDCP_NONE) {
         if (input->enabled) {

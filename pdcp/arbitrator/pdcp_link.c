@@ -61,7 +61,7 @@ void pdcp_link_rest(pdcp_bus_t *bus, uint8_t input, pdcp_status_t status)
     channel->link = PDCP_LINK_INACTIVE;
     pdcp_ends_drop(channel, PDCP_TODO_CONNECT);
     pdcp_ends_note(bus, input, PDCP_TODO_SILENCE);
-    pdcp_ends_release(bus, channel->feed);
+    pdcp_ends_release(bus, channel->source.feed);
     pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, status);
 }
 
@@ -108,8 +108,8 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t node)
         if (input->link != PDCP_LINK_INACTIVE) {
             continue;
         }
-        input->feed = pdcp_ends_source(bus, input);
-        const uint8_t source = pdcp_ends_place(bus, input->feed);
+        input->source.feed = pdcp_ends_source(bus, input);
+        const uint8_t source = pdcp_ends_place(bus, input->source.feed);
         if (source == PDCP_NONE || (input->todo & PDCP_TODO_UPDATE) != 0) {
             continue;
         }
@@ -125,7 +125,7 @@ void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t node)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &bus->nodes.channels[i];
         if (channel->link == PDCP_LINK_ACTIVE &&
-            (channel->node == node || pdcp_ends_place(bus, channel->feed) == node)) {
+            (channel->node == node || pdcp_ends_place(bus, channel->source.feed) == node)) {
             pdcp_link_rest(bus, i, PDCP_OK);
         }
         if (channel->node == node) { /* nothing can be written to it; its next setup silences it first */
@@ -151,13 +151,13 @@ void pdcp_link_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 static void start_connect(pdcp_bus_t *bus, uint8_t input)
 {
     pdcp_channel_t *channel = &bus->nodes.channels[input];
-    channel->feed = pdcp_ends_source(bus, channel);
-    if (channel->feed == PDCP_NONE || !pdcp_ends_is_ready(bus, input)) {
+    channel->source.feed = pdcp_ends_source(bus, channel);
+    if (channel->source.feed == PDCP_NONE || !pdcp_ends_is_ready(bus, input)) {
         pdcp_ends_silence_again(bus, input);
         pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, input, PDCP_ERR_NO_ANSWER);
         return;
     }
-    pdcp_job_begin(bus, PDCP_TODO_CONNECT, input, channel->feed);
+    pdcp_job_begin(bus, PDCP_TODO_CONNECT, input, channel->source.feed);
 }
 
 /* Starts any other job that a channel has to do, unless there is nothing left to do. */
@@ -200,7 +200,7 @@ static void start_wish(pdcp_bus_t *bus)
         pdcp_link_forget_wish(bus, PDCP_ERR_NO_ANSWER);
         return;
     }
-    if (input->link == PDCP_LINK_ACTIVE && input->feed == bus->link.wish_output) {
+    if (input->link == PDCP_LINK_ACTIVE && input->source.feed == bus->link.wish_output) {
         pdcp_link_forget_wish(bus, PDCP_OK);
         return;
     }

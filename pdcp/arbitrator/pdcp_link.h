@@ -1,6 +1,6 @@
 /* Links (pdcp-bus.md 7 and 8): one output feeds many inputs, an input has one source.
  *
- * The tables say how things should be (link, feed, todo), and this file makes the devices agree with them:
+ * The tables say how things should be (link, source, todo), and this file makes the devices agree with them:
  * what happens on the bus and what the host asks for is noted at the channels (pdcp_ends), and one job after
  * the other (pdcp_job) carries the notes out, what silences first. The status of a link is active only when
  * its last write is answered. */

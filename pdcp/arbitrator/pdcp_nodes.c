@@ -110,8 +110,8 @@ void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8
 void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (nodes->channels[i].feed == channel) {
-            nodes->channels[i].feed = PDCP_NONE;
+        if (nodes->channels[i].source.feed == channel) {
+            nodes->channels[i].source.feed = PDCP_NONE;
         }
     }
 }
@@ -148,37 +148,37 @@ void pdcp_nodes_remove(pdcp_nodes_t *nodes, uint8_t node)
 
 void pdcp_nodes_clear_source(pdcp_channel_t *input)
 {
-    input->source.vid = PDCP_NO_SOURCE_WORD;
-    input->source.pid = PDCP_NO_SOURCE_WORD;
-    input->source.sn = PDCP_NO_SOURCE_WORD;
-    input->source_index = PDCP_NO_SOURCE_INDEX;
-    input->source_type = 0;
-    input->source_profile = 0;
+    input->source.identity.vid = PDCP_NO_SOURCE_WORD;
+    input->source.identity.pid = PDCP_NO_SOURCE_WORD;
+    input->source.identity.sn = PDCP_NO_SOURCE_WORD;
+    input->source.index = PDCP_NO_SOURCE_INDEX;
+    input->source.type = 0;
+    input->source.profile = 0;
 }
 
 void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
 {
     if (param == PDCP_IN_SOURCE_VID_PID) {
-        input->source.vid = low;
-        input->source.pid = high;
+        input->source.identity.vid = low;
+        input->source.identity.pid = high;
     } else if (param == PDCP_IN_SOURCE_SERIAL) {
-        input->source.sn = low;
-        input->source_index = (uint8_t)(high & 0xFFu);
+        input->source.identity.sn = low;
+        input->source.index = (uint8_t)(high & 0xFFu);
     } else {
-        input->source_type = low;
-        input->source_profile = high;
+        input->source.type = low;
+        input->source.profile = high;
     }
 }
 
 bool pdcp_nodes_is_source(const pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high)
 {
     if (param == PDCP_IN_SOURCE_VID_PID) {
-        return input->source.vid == low && input->source.pid == high;
+        return input->source.identity.vid == low && input->source.identity.pid == high;
     }
     if (param == PDCP_IN_SOURCE_SERIAL) {
-        return input->source.sn == low && input->source_index == (uint8_t)(high & 0xFFu);
+        return input->source.identity.sn == low && input->source.index == (uint8_t)(high & 0xFFu);
     }
-    return input->source_type == low && input->source_profile == high;
+    return input->source.type == low && input->source.profile == high;
 }
 
 /* Makes a free entry of the pool, which is all 0 but for its node, a channel that nothing is known of. */
@@ -187,7 +187,7 @@ static void make_channel(pdcp_channel_t *channel, uint8_t node, uint16_t index)
     channel->node = node;
     channel->index = (uint8_t)index;
     channel->next = PDCP_NONE;
-    channel->feed = PDCP_NONE;
+    channel->source.feed = PDCP_NONE;
     pdcp_nodes_clear_source(channel);
 }
 
@@ -327,8 +327,8 @@ bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, 
 static uint8_t link_to(const pdcp_nodes_t *nodes, const pdcp_channel_t *input, uint8_t output)
 {
     const pdcp_channel_t *source = &nodes->channels[output];
-    if (input->source_index != source->index ||
-        !pdcp_identity_equal(&input->source, &nodes->nodes[source->node].identity)) {
+    if (input->source.index != source->index ||
+        !pdcp_identity_equal(&input->source.identity, &nodes->nodes[source->node].identity)) {
         return PDCP_LINK_NONE;
     }
     return input->link;

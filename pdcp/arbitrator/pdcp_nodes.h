@@ -81,12 +81,8 @@ typedef struct {
     bool enabled;     /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
     uint8_t todo;     /* a set of pdcp_todo_t */
     /* Inputs only: */
-    uint8_t link;         /* pdcp_link_status_t */
-    uint8_t feed;         /* channel number of the source, PDCP_NONE: it is not on the bus */
-    uint8_t source_index; /* the source's channel index; PDCP_NO_SOURCE_INDEX: unconnected */
-    pdcp_identity_t source;
-    uint16_t source_type;
-    uint16_t source_profile;
+    uint8_t link; /* pdcp_link_status_t */
+    pdcp_source_t source;
     uint16_t terminal_profile;
 } pdcp_channel_t;
 

@@ -105,7 +105,8 @@ typedef struct {
 
 /* --- Links (pdcp_link.h, pdcp_job.h) --- */
 
-/* The source of an input: the output that its parameters 5, 6 and 8 name (D-BUS-7). */
+/* The source of an input: the output that its parameters 5, 6 and 8 name (D-BUS-7). Its size is even, so that
+ * no channel has a gap. */
 typedef struct {
     pdcp_identity_t identity; /* of the output's device */
     uint16_t type;

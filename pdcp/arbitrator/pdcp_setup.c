@@ -245,7 +245,7 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
         pdcp_nodes_drop_feed(&bus->nodes, number);
         channel->link = PDCP_LINK_NONE;
         channel->todo = PDCP_TODO_NONE;
-        channel->feed = PDCP_NONE;
+        channel->source.feed = PDCP_NONE;
     }
     channel->transfer = transfer;
     return true;

@@ -67,14 +67,14 @@ static bool is_possible(pdcp_bus_t *bus)
 /* Puts what the tables say of an input's source, parameter 5, 6 or 8. Returns the value's length. */
 static uint8_t put_source(const pdcp_channel_t *input, uint8_t param, uint8_t *bytes)
 {
-    uint16_t low = input->source_type;
-    uint16_t high = input->source_profile;
+    uint16_t low = input->source.type;
+    uint16_t high = input->source.profile;
     if (param == PDCP_IN_SOURCE_VID_PID) {
-        low = input->source.vid;
-        high = input->source.pid;
+        low = input->source.identity.vid;
+        high = input->source.identity.pid;
     } else if (param == PDCP_IN_SOURCE_SERIAL) {
-        low = input->source.sn;
-        high = input->source_index;
+        low = input->source.identity.sn;
+        high = input->source.index;
     }
     pdcp_bytes_put_u16(&bytes[0], low);
     pdcp_bytes_put_u16(&bytes[2], high);

@@ -98,7 +98,7 @@ static bool is_fed(const limb_t *limb, const pdcp_channel_t *output)
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &nodes_of(limb)->channels[i];
         if (input->node != PDCP_NONE && is_active(input) &&
-            &nodes_of(limb)->channels[input->feed] == output) {
+            &nodes_of(limb)->channels[input->source.feed] == output) {
             return true;
         }
     }
@@ -126,9 +126,9 @@ static bool refuses_types(const limb_part_t *part, uint8_t index)
 /* An active link stands in both devices as it does in the tables. */
 static void check_active(const limb_t *limb, const limb_part_t *part, const pdcp_channel_t *input)
 {
-    const pdcp_channel_t *output = &nodes_of(limb)->channels[input->feed];
+    const pdcp_channel_t *output = &nodes_of(limb)->channels[input->source.feed];
     const uint8_t index = input->index;
-    TEST_ASSERT_TRUE_MESSAGE(input->feed < PDCP_CHANNELS_MAX && output->node != PDCP_NONE,
+    TEST_ASSERT_TRUE_MESSAGE(input->source.feed < PDCP_CHANNELS_MAX && output->node != PDCP_NONE,
                              "an active link without source");
     const limb_part_t *feeder = owner_of(limb, output);
     if (feeder->node == NULL || find_channel(limb, feeder, output->index) != output) {
@@ -211,7 +211,7 @@ static bool has_needs(const limb_t *limb, const limb_part_t *part, uint8_t index
 static void check_input(const limb_t *limb, const limb_part_t *part, const pdcp_channel_t *input)
 {
     const pdcp_nodes_t *nodes = nodes_of(limb);
-    const pdcp_channel_t *output = &nodes->channels[input->feed];
+    const pdcp_channel_t *output = &nodes->channels[input->source.feed];
     check_active(limb, part, input);
     if (!is_hosts(limb, part, input->index) &&
         (!has_needs(limb, part, input->index) || !has_needs(limb, owner_of(limb, output), output->index))) {
@@ -219,8 +219,8 @@ static void check_input(const limb_t *limb, const limb_part_t *part, const pdcp_
     }
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *other = &nodes->channels[i];
-        if (other->node != PDCP_NONE && other != input && is_active(other) && other->feed == input->feed &&
-            (other->type & input->type & SOLE_ACCESS) != 0) {
+        if (other->node != PDCP_NONE && other != input && is_active(other) &&
+            other->source.feed == input->source.feed && (other->type & input->type & SOLE_ACCESS) != 0) {
             complain(limb, part, input->index, "sole access is broken");
         }
     }
@@ -237,8 +237,9 @@ static void check_source(const limb_t *limb, const limb_part_t *part, const pdcp
     if (pdcp_bit(limb->app.arb.bus.audit.refused[PDCP_AUDIT_SERIAL], number)) {
         return;
     }
-    if (names_one != has_source || (has_source && (!pdcp_identity_equal(&named->identity, &input->source) ||
-                                                   named->channel != input->source_index))) {
+    if (names_one != has_source ||
+        (has_source && (!pdcp_identity_equal(&named->identity, &input->source.identity) ||
+                        named->channel != input->source.index))) {
         complain(limb, part, input->index, "names another source than the tables");
     }
 }

@@ -124,10 +124,10 @@ static void read_tables(life_watch_t *watch, uint32_t now_ms)
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &nodes->channels[i];
         if (input->node == PDCP_NONE || input->transfer != PDCP_INPUT || input->link == PDCP_LINK_NONE ||
-            input->feed >= PDCP_CHANNELS_MAX || part_at[input->node] < 0) {
+            input->source.feed >= PDCP_CHANNELS_MAX || part_at[input->node] < 0) {
             continue;
         }
-        const pdcp_channel_t *output = &nodes->channels[input->feed];
+        const pdcp_channel_t *output = &nodes->channels[input->source.feed];
         if (output->node != PDCP_NONE) {
             keys[part_at[input->node]][input->index] = key_of(part_at[output->node], output->index);
         }

@@ -400,7 +400,7 @@ void limb_links(const limb_t *limb, char text[LIMB_TEXT])
         for (uint8_t i = 1; i <= limb->parts[part].ini->desc.channel_count; i++) {
             const pdcp_channel_t *input = active_input(limb, part, i);
             if (input != NULL) {
-                const pdcp_channel_t *output = &nodes->channels[input->feed];
+                const pdcp_channel_t *output = &nodes->channels[input->source.feed];
                 used +=
                     snprintf(&text[used], (size_t)(LIMB_TEXT - used), "%s%d.%u>%d.%u", used == 0 ? "" : " ",
                              part_at(limb, output->node) + 1, output->index, part + 1, i);
@@ -425,9 +425,9 @@ static bool is_source(const limb_t *limb, int part, uint8_t index)
     const pdcp_nodes_t *nodes = &limb->app.arb.bus.nodes;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &nodes->channels[i];
-        if (input->node != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->feed != PDCP_NONE &&
-            nodes->channels[input->feed].index == index &&
-            part_at(limb, nodes->channels[input->feed].node) == part) {
+        if (input->node != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->source.feed != PDCP_NONE &&
+            nodes->channels[input->source.feed].index == index &&
+            part_at(limb, nodes->channels[input->source.feed].node) == part) {
             return true;
         }
     }
@@ -446,7 +446,7 @@ static void check_channel(const limb_t *limb, int part, uint8_t index)
         TEST_ASSERT_EQUAL_MESSAGE(is_source(limb, part, index), channel->enabled, name);
         return;
     }
-    const pdcp_channel_t *output = &nodes->channels[input->feed];
+    const pdcp_channel_t *output = &nodes->channels[input->source.feed];
     const pdcp_device_source_t *source = pdcp_device_source(device, index);
     TEST_ASSERT_TRUE_MESSAGE(channel->enabled, name);
     TEST_ASSERT_EQUAL_MESSAGE(nodes->nodes[output->node].node_id, channel->source_device, name);

@@ -82,7 +82,7 @@ static bool input_agrees(const pdcp_channel_t *input, const pdcp_device_channel_
     if (input->link != PDCP_LINK_ACTIVE) {
         return !there->enabled;
     }
-    const pdcp_channel_t *output = &nodes->channels[input->feed];
+    const pdcp_channel_t *output = &nodes->channels[input->source.feed];
     return there->enabled && there->source_device == nodes->nodes[output->node].node_id &&
            there->source_channel == output->node_id;
 }
@@ -91,7 +91,7 @@ static bool is_fed(uint8_t output)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *input = &limb.app.arb.bus.nodes.channels[i];
-        if (input->node != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->feed == output) {
+        if (input->node != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->source.feed == output) {
             return true;
         }
     }

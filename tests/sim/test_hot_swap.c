@@ -693,7 +693,7 @@ static void expect_lawful(const char *text)
             TEST_ASSERT_FALSE_MESSAGE(channels[i].node != PDCP_NONE && channels[i].link == PDCP_LINK_ACTIVE &&
                                           channels[k].node != PDCP_NONE &&
                                           channels[k].link == PDCP_LINK_ACTIVE &&
-                                          channels[i].feed == channels[k].feed,
+                                          channels[i].source.feed == channels[k].source.feed,
                                       text);
         }
     }

@@ -210,8 +210,8 @@ void systems_lose(systems_t *s, uint8_t place)
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &s->nodes.channels[i];
         const bool own = channel->node == place;
-        const bool fed = channel->node != PDCP_NONE && channel->feed != PDCP_NONE &&
-                         s->nodes.channels[channel->feed].node == place;
+        const bool fed = channel->node != PDCP_NONE && channel->source.feed != PDCP_NONE &&
+                         s->nodes.channels[channel->source.feed].node == place;
         if ((own || fed) && channel->link == PDCP_LINK_ACTIVE) {
             channel->link = PDCP_LINK_INACTIVE;
         }
@@ -253,11 +253,11 @@ void systems_connect(systems_t *s, uint8_t output, uint8_t input)
     pdcp_channel_t *channel = &s->nodes.channels[input];
     const pdcp_channel_t *source = &s->nodes.channels[output];
     channel->link = PDCP_LINK_ACTIVE;
-    channel->feed = output;
-    channel->source = s->nodes.nodes[source->node].identity;
-    channel->source_index = source->index;
-    channel->source_type = source->type;
-    channel->source_profile = source->profile;
+    channel->source.feed = output;
+    channel->source.identity = s->nodes.nodes[source->node].identity;
+    channel->source.index = source->index;
+    channel->source.type = source->type;
+    channel->source.profile = source->profile;
 }
 
 void systems_link(systems_t *s, const char *links)
@@ -306,13 +306,13 @@ static void take_link_away(systems_t *s, uint8_t input)
     pdcp_channel_t *channel = &s->nodes.channels[input];
     const uint8_t entry = profile_links_of(&s->links, &s->nodes, input);
     if (entry != PDCP_NONE &&
-        channel->feed ==
+        channel->source.feed ==
             profile_links_channel(&s->links, &s->nodes, &s->links.entries[entry].output, PDCP_OUTPUT)) {
         channel->link = PDCP_LINK_INACTIVE;
         return;
     }
     channel->link = PDCP_LINK_NONE;
-    channel->feed = PDCP_NONE;
+    channel->source.feed = PDCP_NONE;
     pdcp_nodes_clear_source(channel);
 }
 

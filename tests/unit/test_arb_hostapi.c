@@ -480,8 +480,8 @@ static void test_sole_access(void)
     add_devices();
     add_second_input();
     channel(1)->link = PDCP_LINK_INACTIVE; /* remembered: it comes back */
-    channel(1)->source = x.arb->bus.nodes.nodes[0].identity;
-    channel(1)->source_index = 1;
+    channel(1)->source.identity = x.arb->bus.nodes.nodes[0].identity;
+    channel(1)->source.index = 1;
     ask(0x2307, BYTES(DEV_OUT, 1, 2, 0, 2, 0, 7, 0, 1));
     expect_error(0x2309, 0x08);
     exchange_silence(&x);
@@ -495,9 +495,9 @@ static void test_sole_access(void)
 static void remember_link(uint8_t node, uint8_t status)
 {
     channel(node)->link = status;
-    channel(node)->feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
-    channel(node)->source = x.arb->bus.nodes.nodes[0].identity;
-    channel(node)->source_index = 1;
+    channel(node)->source.feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    channel(node)->source.identity = x.arb->bus.nodes.nodes[0].identity;
+    channel(node)->source.index = 1;
 }
 
 /* D-API-13: an input that has the link already, inactive, does not get it while another one works. One that
@@ -563,8 +563,8 @@ static void test_an_output_for_its_own_device(void)
     add_devices();
     add_second_input();
     channel(2)->link = PDCP_LINK_INACTIVE; /* another input has it for itself: that comes second */
-    channel(2)->source = x.arb->bus.nodes.nodes[0].identity;
-    channel(2)->source_index = 1;
+    channel(2)->source.identity = x.arb->bus.nodes.nodes[0].identity;
+    channel(2)->source.index = 1;
     channel(1)->node = 0;
     channel(0)->next = pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
     channel(1)->index = 2;

@@ -132,7 +132,7 @@ static void test_an_input_without_a_link(void)
 /* One that named a source when it was set up is left to the profile layer until that has decided. */
 static void test_an_input_whose_source_is_not_decided(void)
 {
-    x.arb->bus.nodes.channels[input()].source_index = 1;
+    x.arb->bus.nodes.channels[input()].source.index = 1;
     pdcp_arb_plan_links(x.arb, false);
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 239);
@@ -528,9 +528,9 @@ static void build_limb(void)
     }
     for (unsigned i = 2; i < CHANNELS; i += i % 4 == 2 ? 1 : 3) {
         pdcp_channel_t *channel = &nodes->channels[i];
-        channel->feed = (uint8_t)((i + 2) % CHANNELS); /* an output of the next device */
-        channel->source = nodes->nodes[nodes->channels[channel->feed].node].identity;
-        channel->source_index = nodes->channels[channel->feed].index;
+        channel->source.feed = (uint8_t)((i + 2) % CHANNELS); /* an output of the next device */
+        channel->source.identity = nodes->nodes[nodes->channels[channel->source.feed].node].identity;
+        channel->source.index = nodes->channels[channel->source.feed].index;
         channel->link = PDCP_LINK_ACTIVE;
     }
 }
@@ -553,16 +553,16 @@ static void answer(uint8_t number, uint8_t param)
         frame.data[4] = channel->node_id;
     } else if (param == 5) {
         frame.dlc = 8;
-        pdcp_bytes_put_u16(&frame.data[4], channel->source.vid);
-        pdcp_bytes_put_u16(&frame.data[6], channel->source.pid);
+        pdcp_bytes_put_u16(&frame.data[4], channel->source.identity.vid);
+        pdcp_bytes_put_u16(&frame.data[6], channel->source.identity.pid);
     } else if (param == 6) {
         frame.dlc = 7;
-        pdcp_bytes_put_u16(&frame.data[4], channel->source.sn);
-        frame.data[6] = channel->source_index;
+        pdcp_bytes_put_u16(&frame.data[4], channel->source.identity.sn);
+        frame.data[6] = channel->source.index;
     } else if (param == 7) {
         frame.dlc = 6;
-        frame.data[4] = nodes->nodes[nodes->channels[channel->feed].node].node_id;
-        frame.data[5] = nodes->channels[channel->feed].node_id;
+        frame.data[4] = nodes->nodes[nodes->channels[channel->source.feed].node].node_id;
+        frame.data[5] = nodes->channels[channel->source.feed].node_id;
     }
     bus_bits += bits_of(frame.dlc);
     (void)pdcp_arb_on_frame(x.arb, x.now_ms, &frame);
@@ -650,9 +650,9 @@ static void test_a_turn_with_channels_that_have_no_link(void)
         if (i % 4 < 2) {
             channel->enabled = i == 0;
         } else {
-            channel->feed = 0;
-            channel->source = x.arb->bus.nodes.nodes[0].identity;
-            channel->source_index = 1;
+            channel->source.feed = 0;
+            channel->source.identity = x.arb->bus.nodes.nodes[0].identity;
+            channel->source.index = 1;
         }
     }
     audit_limb();

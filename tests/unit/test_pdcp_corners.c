@@ -795,7 +795,7 @@ static void old_link_comes_back(void)
     TEST_ASSERT_EQUAL(1, output_enabled);
     TEST_ASSERT_EQUAL(1, input_enabled);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(1, 1)->link);
-    TEST_ASSERT_EQUAL(4, channel(1, 1)->source.sn);
+    TEST_ASSERT_EQUAL(4, channel(1, 1)->source.identity.sn);
     TEST_ASSERT_FALSE(channel(2, 1)->enabled);
 }
 
@@ -1018,7 +1018,7 @@ static void test_a_refused_link_waits(void)
     wrote(0x13, 4, 1, "01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(1, 1)->link);
-    TEST_ASSERT_EQUAL(9, channel(1, 1)->source.sn);
+    TEST_ASSERT_EQUAL(9, channel(1, 1)->source.identity.sn);
 }
 
 /* Both ends are gone; the input is back first. */

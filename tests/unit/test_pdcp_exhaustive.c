@@ -88,9 +88,10 @@ static void fill_bus(void)
     exchange_add_input(&x);
     pdcp_channel_t *input = &x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)];
     input->link = PDCP_LINK_ACTIVE;
-    input->feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    input->source.feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
     input->enabled = true;
-    x.arb->bus.nodes.channels[input->feed].enabled = true; /* else a stranger would take its id (D-BUS-36) */
+    x.arb->bus.nodes.channels[input->source.feed].enabled =
+        true; /* else a stranger would take its id (D-BUS-36) */
     exchange_rx(&x, "613#01 0300 0300 0300");
     exchange_rx(&x, "013#0A");
     exchange_rx(&x, "614#01 0400 0400 0400");

@@ -114,7 +114,7 @@ static void fail_at(int step)
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_WISH)->status);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
-    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, the_input()->source_index);
+    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, the_input()->source.index);
     TEST_ASSERT_FALSE(the_input()->enabled);
     TEST_ASSERT_FALSE(x.arb->bus.nodes.channels[output()].enabled);
     TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));
@@ -218,7 +218,7 @@ static void test_a_lost_source_is_silenced(void)
     exchange_pass(&x, 500);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
     exchange_run(&x, silencing);
-    TEST_ASSERT_EQUAL(4, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
     TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes)); /* inactive links count */
 }
 
@@ -324,7 +324,7 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
     }
     TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->feed);
+    TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->source.feed);
     exchange_add_output(&x, "FD"); /* a freed id is given out last (D-BUS-36) */
     exchange_run(&x, making_again);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
@@ -445,7 +445,7 @@ static void test_a_source_is_replaced(void)
     exchange_run(&x, binding);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1), input()));
     exchange_run(&x, replacing);
-    TEST_ASSERT_EQUAL(9, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(9, the_input()->source.identity.sn);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
     TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
 }

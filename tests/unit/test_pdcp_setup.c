@@ -68,14 +68,14 @@ static void test_everything_is_read_and_written_in_order(void)
     TEST_ASSERT_EQUAL_HEX16(0x7200, nodes->channels[first].type);
     TEST_ASSERT_EQUAL_HEX16(0x2200, nodes->channels[first].profile);
     TEST_ASSERT_EQUAL(PDCP_INPUT, nodes->channels[first].transfer);
-    TEST_ASSERT_EQUAL(1, nodes->channels[first].source.vid);
-    TEST_ASSERT_EQUAL(3, nodes->channels[first].source.pid);
-    TEST_ASSERT_EQUAL(7, nodes->channels[first].source.sn);
-    TEST_ASSERT_EQUAL(2, nodes->channels[first].source_index);
-    TEST_ASSERT_EQUAL_HEX16(0x5000, nodes->channels[first].source_type);
-    TEST_ASSERT_EQUAL_HEX16(0x2120, nodes->channels[first].source_profile);
+    TEST_ASSERT_EQUAL(1, nodes->channels[first].source.identity.vid);
+    TEST_ASSERT_EQUAL(3, nodes->channels[first].source.identity.pid);
+    TEST_ASSERT_EQUAL(7, nodes->channels[first].source.identity.sn);
+    TEST_ASSERT_EQUAL(2, nodes->channels[first].source.index);
+    TEST_ASSERT_EQUAL_HEX16(0x5000, nodes->channels[first].source.type);
+    TEST_ASSERT_EQUAL_HEX16(0x2120, nodes->channels[first].source.profile);
     TEST_ASSERT_EQUAL_HEX16(0x1110, nodes->channels[first].terminal_profile);
-    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, nodes->channels[second].source_index); /* D-BUS-7 */
+    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, nodes->channels[second].source.index); /* D-BUS-7 */
     TEST_ASSERT_EQUAL(PDCP_OUTPUT, nodes->channels[third].transfer);
     TEST_ASSERT_EQUAL(0xFE, nodes->channels[third].node_id);
 

@@ -61,8 +61,8 @@ static void update(const char *vid_pid, const char *serial)
 static void expect_table(pdcp_link_status_t link, uint16_t sn, uint8_t index)
 {
     TEST_ASSERT_EQUAL(link, the_input()->link);
-    TEST_ASSERT_EQUAL_HEX16(sn, the_input()->source.sn);
-    TEST_ASSERT_EQUAL_HEX8(index, the_input()->source_index);
+    TEST_ASSERT_EQUAL_HEX16(sn, the_input()->source.identity.sn);
+    TEST_ASSERT_EQUAL_HEX8(index, the_input()->source.index);
     TEST_ASSERT_EQUAL(PDCP_TODO_NONE, the_input()->todo);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK)); /* no link has changed */
 }
@@ -249,7 +249,7 @@ static void test_an_input_lost_in_the_middle(void)
     exchange_rx(&x, "211#84 01 04 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(4, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
 }
 
 /* The source of the remembered link. */
@@ -271,7 +271,7 @@ static void test_a_setup_that_finds_another_source(void)
                           "212#83 01 08 01 0050 2021");
     exchange_run(&x, naming);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(4, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
 }
 
 /* 8 may be all that is wrong. */
@@ -334,7 +334,7 @@ static void test_a_remembered_link_is_named(void)
     pdcp_arb_remember(x.arb, x.now_ms, input(), &owner, 2, 0x5000, 0x2120);
     exchange_run(&x, missing);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(9, the_input()->source.sn);
+    TEST_ASSERT_EQUAL(9, the_input()->source.identity.sn);
 }
 
 int main(void)

@@ -260,7 +260,7 @@ static void test_the_source_that_an_input_names(void)
     check_end(&gone, &end);
     TEST_ASSERT_FALSE(
         profile_channel_named_source(&s.nodes, systems_channel(&s, "2.2"), &end)); /* index FFh (D-BUS-7) */
-    s.nodes.channels[systems_channel(&s, "2.3")].source_index = 0;
+    s.nodes.channels[systems_channel(&s, "2.3")].source.index = 0;
     TEST_ASSERT_FALSE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.3"), &end));
 }
 

@@ -178,7 +178,7 @@ static void read_back(void)
             TEST_ASSERT_TRUE(profile_links_put(&s.links, &link, false));
         }
         s.nodes.channels[i].link = PDCP_LINK_NONE;
-        s.nodes.channels[i].feed = PDCP_NONE;
+        s.nodes.channels[i].source.feed = PDCP_NONE;
     }
 }
 

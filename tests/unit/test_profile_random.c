@@ -607,7 +607,7 @@ static void look_back(void)
     memset(before, PDCP_NONE, sizeof before);
     for (const uint8_t *i = inputs; *i != PDCP_NONE; i++) {
         if (s.nodes.channels[*i].link == PDCP_LINK_ACTIVE) {
-            before[*i] = s.nodes.channels[*i].feed;
+            before[*i] = s.nodes.channels[*i].source.feed;
         }
     }
     for (uint8_t e = 0; e < s.links.count; e++) {

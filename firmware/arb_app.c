@@ -23,7 +23,7 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
     }
 }
 
-/* Parts of a stored configuration keep their places when strangers crowd in (D-BUS-43). */
+/* Parts of a stored configuration keep their places when unknown devices crowd in (D-BUS-43). */
 static bool knows(void *ctx, const pdcp_identity_t *identity)
 {
     const arb_app_t *app = ctx;
@@ -39,7 +39,7 @@ void arb_app_init(arb_app_t *app, const arb_port_t *port, const arb_settings_t *
     pdcp_arb_know(&app->arb, knows);
     arb_nvm_init(&app->nvm, port);
     arb_store_load(&app->store, &app->nvm, &app->arb.bus.bind);
-    arb_limb_init(&app->limb, &app->arb.bus.nodes, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
+    arb_limb_init(&app->limb, &app->arb.bus.tables, &app->nvm, settings->strict_crc ? ARB_FLAG_STRICT_CRC : 0,
                   settings->no_autoconfig ? ARB_FLAG_AUTOCONFIGURE : 0, now_ms);
     app->api.strict = (arb_limb_flags(&app->limb) & ARB_FLAG_STRICT_CRC) != 0;
     pdcp_arb_plan_links(&app->arb, false);

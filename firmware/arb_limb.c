@@ -39,12 +39,12 @@ static void apply_flags(arb_limb_t *limb, uint8_t flags)
     limb->run.at_events = (flags & ARB_FLAG_HOT_SWAP) != 0 ? limb->run.at_start : PROFILE_PLAN_ORIGINALS;
 }
 
-void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
+void arb_limb_init(arb_limb_t *limb, const pdcp_tables_t *tables, arb_nvm_t *nvm, uint8_t flags_on,
                    uint8_t flags_off, uint32_t now_ms)
 {
     memset(limb, 0, sizeof *limb);
     limb->told = true;
-    profile_run_init(&limb->run, nodes, now_ms);
+    profile_run_init(&limb->run, tables, now_ms);
     arb_flags_load(&limb->flags, nvm);
     arb_config_init(&limb->config, nvm, &user, limb, now_ms);
     apply_flags(limb, (uint8_t)((arb_flags_get(&limb->flags) | flags_on) & ~flags_off));
@@ -136,11 +136,11 @@ static uint8_t started(arb_limb_t *limb, stage_t stage, arb_config_status_t stat
 
 /* --- Reading what is stored --- */
 
-static bool is_present(const pdcp_nodes_t *nodes, const profile_end_t *end, uint8_t transfer)
+static bool is_present(const pdcp_tables_t *tables, const profile_end_t *end, uint8_t transfer)
 {
-    const uint8_t place = pdcp_nodes_find(nodes, &end->owner);
+    const uint8_t place = pdcp_tables_find(tables, &end->owner);
     return place != PDCP_NONE &&
-           profile_channel_is_ready(nodes, pdcp_nodes_channel(nodes, place, end->index), transfer);
+           profile_channel_is_ready(tables, pdcp_tables_channel(tables, place, end->index), transfer);
 }
 
 /* Is the configuration just read better than the best one so far (D-PRO-4)? One without a link that has an
@@ -155,8 +155,8 @@ static void compare(arb_limb_t *limb)
 
 static void score_link(arb_limb_t *limb, uint8_t number, const profile_link_t *link)
 {
-    const bool output = is_present(limb->run.scene.nodes, &link->output, PDCP_OUTPUT);
-    const bool input = is_present(limb->run.scene.nodes, &link->input, PDCP_INPUT);
+    const bool output = is_present(limb->run.scene.tables, &link->output, PDCP_OUTPUT);
+    const bool input = is_present(limb->run.scene.tables, &link->input, PDCP_INPUT);
     if (number != limb->number) {
         compare(limb);
         limb->number = number;

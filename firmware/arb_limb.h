@@ -51,9 +51,9 @@ typedef struct {
     profile_run_t run;
 } arb_limb_t;
 
-/* flags_on and flags_off override what is stored. nodes: the arbitrator's tables; they must outlive
+/* flags_on and flags_off override what is stored. tables: the arbitrator's tables; they must outlive
  * limb. Reads the memory: may block for as long as that takes. */
-void arb_limb_init(arb_limb_t *limb, const pdcp_nodes_t *nodes, arb_nvm_t *nvm, uint8_t flags_on,
+void arb_limb_init(arb_limb_t *limb, const pdcp_tables_t *tables, arb_nvm_t *nvm, uint8_t flags_on,
                    uint8_t flags_off, uint32_t now_ms);
 
 /* An event of the arbitrator; hand all of them in. */

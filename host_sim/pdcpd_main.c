@@ -66,9 +66,9 @@ static const char *bus_state_name(int8_t state)
 
 static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
 {
-    const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
-    const pdcp_channel_t *input = &nodes->channels[event->channel];
-    const pdcp_identity_t *to = &nodes->nodes[input->node].identity;
+    const pdcp_tables_t *tables = &daemon->app.arb.bus.tables;
+    const pdcp_channel_t *input = &tables->channels[event->channel];
+    const pdcp_identity_t *to = &tables->devices[input->place].identity;
     const pdcp_identity_t *from = &input->source.identity;
     const char *outcome = event->status == PDCP_OK ? "" : ", could not be made";
     if (input->link == PDCP_LINK_NONE) {
@@ -83,9 +83,9 @@ static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
 
 static void say_audit(const daemon_t *daemon, const pdcp_event_t *event)
 {
-    const pdcp_nodes_t *nodes = &daemon->app.arb.bus.nodes;
-    const pdcp_channel_t *channel = &nodes->channels[event->channel];
-    const pdcp_identity_t *owner = &nodes->nodes[channel->node].identity;
+    const pdcp_tables_t *tables = &daemon->app.arb.bus.tables;
+    const pdcp_channel_t *channel = &tables->channels[event->channel];
+    const pdcp_identity_t *owner = &tables->devices[channel->place].identity;
     say(daemon, PDCPD_LOG_WARNING, "%u:%u:%u.%u had a wrong parameter %u", owner->vid, owner->pid, owner->sn,
         channel->index, (unsigned)event->status);
 }
@@ -116,10 +116,10 @@ static void say_device(const daemon_t *daemon, const pdcp_event_t *event)
     if (kind >= sizeof sayings / sizeof sayings[0] || sayings[kind].text == NULL) {
         return;
     }
-    if (event->node != PDCP_NONE) {
-        const pdcp_node_t *node = &daemon->app.arb.bus.nodes.nodes[event->node];
-        (void)snprintf(name, sizeof name, "%u:%u:%u (id %u)", node->identity.vid, node->identity.pid,
-                       node->identity.sn, node->node_id);
+    if (event->place != PDCP_NONE) {
+        const pdcp_device_entry_t *device = &daemon->app.arb.bus.tables.devices[event->place];
+        (void)snprintf(name, sizeof name, "%u:%u:%u (id %u)", device->identity.vid, device->identity.pid,
+                       device->identity.sn, device->node_id);
     }
     say(daemon, sayings[kind].level, "%s%s", sayings[kind].names_device ? name : "", sayings[kind].text);
 }

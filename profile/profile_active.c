@@ -5,7 +5,7 @@
 
 uint8_t profile_active_entry_of(const profile_run_t *run, uint8_t input)
 {
-    return profile_links_of(&run->links, run->scene.nodes, input);
+    return profile_links_of(&run->links, run->scene.tables, input);
 }
 
 uint8_t profile_active_stood_in_for(const profile_run_t *run, uint8_t input)
@@ -32,10 +32,10 @@ void profile_active_remove(profile_run_t *run, uint8_t entry)
 
 bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host)
 {
-    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const pdcp_tables_t *tables = run->scene.tables;
     profile_link_t link;
-    profile_channel_end(nodes, input, &link.input);
-    if (run->frozen || !profile_channel_named_source(nodes, input, &link.output) ||
+    profile_channel_end(tables, input, &link.input);
+    if (run->frozen || !profile_channel_named_source(tables, input, &link.output) ||
         (!by_host && profile_links_is_claimed(&run->links, &link))) {
         return true;
     }
@@ -50,7 +50,7 @@ bool profile_active_take_up(profile_run_t *run)
 {
     bool complete = true;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (profile_channel_source(run->scene.nodes, i) != PDCP_NONE &&
+        if (profile_channel_source(run->scene.tables, i) != PDCP_NONE &&
             profile_active_entry_of(run, i) == PDCP_NONE &&
             profile_active_stood_in_for(run, i) == PDCP_NONE && !profile_active_adopt(run, i, false)) {
             complete = false;
@@ -61,26 +61,26 @@ bool profile_active_take_up(profile_run_t *run)
 
 /* The input of a device (PDCP_NONE: of any) that names a source and comes next behind the last one;
  * PDCP_NONE: there are no more. */
-static uint8_t next_input_of(const pdcp_nodes_t *nodes, uint8_t node, uint8_t last)
+static uint8_t next_input_of(const pdcp_tables_t *tables, uint8_t place, uint8_t last)
 {
     uint8_t best = PDCP_NONE;
     profile_end_t source;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if ((node == PDCP_NONE || nodes->channels[i].node == node) &&
-            profile_channel_is_ready(nodes, i, PDCP_INPUT) &&
-            profile_channel_named_source(nodes, i, &source) &&
-            (last == PDCP_NONE || profile_match_is_before(nodes, last, i)) &&
-            (best == PDCP_NONE || profile_match_is_before(nodes, i, best))) {
+        if ((place == PDCP_NONE || tables->channels[i].place == place) &&
+            profile_channel_is_ready(tables, i, PDCP_INPUT) &&
+            profile_channel_named_source(tables, i, &source) &&
+            (last == PDCP_NONE || profile_match_is_before(tables, last, i)) &&
+            (best == PDCP_NONE || profile_match_is_before(tables, i, best))) {
             best = i;
         }
     }
     return best;
 }
 
-void profile_active_read_back(profile_run_t *run, uint8_t node)
+void profile_active_read_back(profile_run_t *run, uint8_t place)
 {
     uint8_t input = PDCP_NONE;
-    while ((input = next_input_of(run->scene.nodes, node, input)) != PDCP_NONE) {
+    while ((input = next_input_of(run->scene.tables, place, input)) != PDCP_NONE) {
         if (profile_active_entry_of(run, input) == PDCP_NONE) {
             (void)profile_active_adopt(run, input, false);
         }
@@ -106,16 +106,17 @@ bool profile_active_load_link(profile_run_t *run, const profile_link_t *link)
  * source is another. PDCP_NONE: there is none. */
 static uint8_t replaced_by(const profile_run_t *run, uint8_t input)
 {
-    const pdcp_nodes_t *nodes = run->scene.nodes;
-    const uint8_t source = profile_channel_source(nodes, input);
+    const pdcp_tables_t *tables = run->scene.tables;
+    const uint8_t source = profile_channel_source(tables, input);
     if (source == PDCP_NONE) {
         return PDCP_NONE;
     }
     uint8_t entry = profile_active_stood_in_for(run, input);
     if (entry == PDCP_NONE) {
         entry = profile_active_entry_of(run, input);
-        if (entry != PDCP_NONE && profile_links_channel(&run->links, nodes, &run->links.entries[entry].output,
-                                                        PDCP_OUTPUT) == source) {
+        if (entry != PDCP_NONE &&
+            profile_links_channel(&run->links, tables, &run->links.entries[entry].output, PDCP_OUTPUT) ==
+                source) {
             return PDCP_NONE;
         }
     }

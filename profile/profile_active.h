@@ -41,7 +41,7 @@ bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host);
 /* Reads the configuration back from the sources that the inputs of a device (PDCP_NONE: of all) name
  * (D-PRO-19). The order does not depend on where they stand in the tables: of two that claim the same output
  * the first one gets it. */
-void profile_active_read_back(profile_run_t *run, uint8_t node);
+void profile_active_read_back(profile_run_t *run, uint8_t place);
 
 void profile_active_remove(profile_run_t *run, uint8_t entry);
 

@@ -8,20 +8,20 @@
 uint8_t profile_board_entry_of(profile_board_t *board, uint8_t input)
 {
     board->left -= PROFILE_EFFORT_FIND;
-    return profile_links_of(board->links, board->nodes, input);
+    return profile_links_of(board->links, board->tables, input);
 }
 
 uint8_t profile_board_output_of(profile_board_t *board, uint8_t entry)
 {
     board->left -= PROFILE_EFFORT_FIND;
-    return profile_links_channel(board->links, board->nodes, &profile_board_entry(board, entry)->output,
+    return profile_links_channel(board->links, board->tables, &profile_board_entry(board, entry)->output,
                                  PDCP_OUTPUT);
 }
 
 void profile_board_look_at_ends(profile_board_t *board)
 {
     board->left -= PROFILE_EFFORT_FIND;
-    board->input = profile_links_channel(board->links, board->nodes,
+    board->input = profile_links_channel(board->links, board->tables,
                                          &profile_board_entry(board, board->at)->input, PDCP_INPUT);
     board->output = profile_board_output_of(board, board->at);
 }
@@ -32,7 +32,8 @@ bool profile_board_hears_output_of(const profile_board_t *board, uint8_t input, 
     if (output == PDCP_NONE) {
         return false;
     }
-    return profile_links_name(board->links, board->nodes, &profile_board_entry(board, entry)->output, output);
+    return profile_links_name(board->links, board->tables, &profile_board_entry(board, entry)->output,
+                              output);
 }
 
 uint8_t profile_board_rival_of(profile_board_t *board, uint8_t input, uint8_t output)
@@ -75,7 +76,7 @@ bool profile_board_may_link(const profile_board_t *board, uint8_t output, uint8_
         (profile_channel_is_sole(to) && pdcp_bit(board->taken, output))) {
         return false;
     }
-    return profile_board_channel(board, output)->node != to->node;
+    return profile_board_channel(board, output)->place != to->place;
 }
 
 bool profile_board_is_connected(const profile_board_t *board, uint8_t input)
@@ -92,7 +93,7 @@ static bool is_by_output(uint8_t need)
 uint8_t profile_board_next_need(profile_board_t *board, uint8_t input, uint8_t need, uint8_t last)
 {
     const uint8_t by = is_by_output(need) ? board->want[input] : input;
-    const pdcp_node_t *owner = &board->nodes->nodes[profile_board_channel(board, by)->node];
+    const pdcp_device_entry_t *owner = &board->tables->devices[profile_board_channel(board, by)->place];
     if (owner->needs_stride == 0) {
         return PDCP_NONE;
     }
@@ -101,7 +102,7 @@ uint8_t profile_board_next_need(profile_board_t *board, uint8_t input, uint8_t n
         const pdcp_channel_t *channel = profile_board_channel(board, c);
         board->left--;
         if (!profile_board_is_connected(board, c) &&
-            pdcp_nodes_needs(board->nodes, by, need >= PROFILE_DESIRED_BY_OUTPUT, channel->index)) {
+            pdcp_tables_needs(board->tables, by, need >= PROFILE_DESIRED_BY_OUTPUT, channel->index)) {
             break;
         }
         c = channel->next;

@@ -10,7 +10,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 #include "profile_links.h"
 #include "profile_scene.h"
 
@@ -132,7 +132,7 @@ typedef struct {
     uint32_t steps; /* channels compared in this plan */
 
     const profile_scene_t *scene; /* of the call under way */
-    const pdcp_nodes_t *nodes;    /* the scene's */
+    const pdcp_tables_t *tables;  /* the scene's */
     profile_links_t *links;       /* the scene's */
 
     uint8_t taken[PROFILE_CHANNEL_BYTES]; /* bit per output: it feeds a sole-access input */
@@ -157,7 +157,7 @@ typedef struct {
 
 static inline const pdcp_channel_t *profile_board_channel(const profile_board_t *board, uint8_t channel)
 {
-    return &board->nodes->channels[channel];
+    return &board->tables->channels[channel];
 }
 
 static inline profile_entry_t *profile_board_entry(const profile_board_t *board, uint8_t number)

@@ -9,7 +9,7 @@
 static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     profile_end_t source;
-    if (profile_channel_named_source(run->scene.nodes, input, &source)) {
+    if (profile_channel_named_source(run->scene.tables, input, &source)) {
         pdcp_arb_forget_source(arb, now_ms, input);
     }
 }
@@ -18,7 +18,7 @@ static void forget_source(const profile_run_t *run, pdcp_arb_t *arb, uint32_t no
  * host sees a link of the configuration whose source is missing as inactive (D-BUS-10, D-PRO-15). */
 static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
-    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    const pdcp_channel_t *channel = &run->scene.tables->channels[input];
     const uint8_t entry = profile_active_entry_of(run, input);
     bool original = false;
     if (entry != PDCP_NONE) {
@@ -38,7 +38,7 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
     if (channel->link == PDCP_LINK_ACTIVE) {
         run->moves++;
         if (original) {
-            pdcp_arb_rest(arb, now_ms, input);
+            pdcp_arb_deactivate(arb, now_ms, input);
         }
     }
     if (!original) {
@@ -51,20 +51,20 @@ static void unlink_one(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uin
 static void unlink_all(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (run->plan.want[i] == PDCP_NONE && profile_channel_is_ready(run->scene.nodes, i, PDCP_INPUT)) {
+        if (run->plan.want[i] == PDCP_NONE && profile_channel_is_ready(run->scene.tables, i, PDCP_INPUT)) {
             unlink_one(run, arb, now_ms, i);
         }
     }
 }
 
 /* Does a channel require an input of its device that is not connected? */
-static bool misses_something(const pdcp_nodes_t *nodes, uint8_t channel)
+static bool misses_something(const pdcp_tables_t *tables, uint8_t channel)
 {
-    const pdcp_node_t *owner = &nodes->nodes[nodes->channels[channel].node];
+    const pdcp_device_entry_t *owner = &tables->devices[tables->channels[channel].place];
     uint8_t c = owner->needs_stride != 0 ? owner->first_channel : (uint8_t)PDCP_NONE;
-    while (c != PDCP_NONE && (profile_channel_source(nodes, c) != PDCP_NONE ||
-                              !pdcp_nodes_needs(nodes, channel, false, nodes->channels[c].index))) {
-        c = nodes->channels[c].next;
+    while (c != PDCP_NONE && (profile_channel_source(tables, c) != PDCP_NONE ||
+                              !pdcp_tables_needs(tables, channel, false, tables->channels[c].index))) {
+        c = tables->channels[c].next;
     }
     return c != PDCP_NONE;
 }
@@ -77,17 +77,17 @@ static bool is_hosts(const profile_run_t *run, uint8_t input, uint8_t source)
         return false;
     }
     const profile_entry_t *own = &run->links.entries[entry];
-    return own->by_host && profile_links_name(&run->links, run->scene.nodes, &own->output, source);
+    return own->by_host && profile_links_name(&run->links, run->scene.tables, &own->output, source);
 }
 
 /* Does this link work although something that it requires is not connected? Links that the plan under way has
  * made are left alone: otherwise those of a loop would never be made. */
 static bool is_lacking(const profile_run_t *run, uint8_t input)
 {
-    const pdcp_nodes_t *nodes = run->scene.nodes;
-    const uint8_t source = profile_channel_source(nodes, input);
+    const pdcp_tables_t *tables = run->scene.tables;
+    const uint8_t source = profile_channel_source(tables, input);
     return source != PDCP_NONE && !pdcp_bit(run->scene.made, input) && !is_hosts(run, input, source) &&
-           (misses_something(nodes, source) || misses_something(nodes, input));
+           (misses_something(tables, source) || misses_something(tables, input));
 }
 
 /* Makes links inactive that lack something, once the plan has met a link that fails (D-PRO-9). Most often the
@@ -102,7 +102,7 @@ static bool deactivate_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32
     }
     while (i < PDCP_CHANNELS_MAX) {
         if (is_lacking(run, i)) {
-            pdcp_arb_rest(arb, now_ms, i);
+            pdcp_arb_deactivate(arb, now_ms, i);
             any = true;
             i = 0; /* others may require this one */
         } else {
@@ -116,14 +116,14 @@ static bool deactivate_lacking(const profile_run_t *run, pdcp_arb_t *arb, uint32
  * gone since the plan was made are left to the next plan. */
 static uint8_t next_input(const profile_run_t *run)
 {
-    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const pdcp_tables_t *tables = run->scene.tables;
     uint8_t found = PDCP_NONE;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t output = run->plan.want[i];
-        const pdcp_channel_t *channel = &nodes->channels[i];
-        if (!profile_channel_is_ready(nodes, output, PDCP_OUTPUT) ||
-            !profile_channel_is_ready(nodes, i, PDCP_INPUT) ||
-            (channel->link == PDCP_LINK_ACTIVE && channel->source.feed == output)) {
+        const pdcp_channel_t *channel = &tables->channels[i];
+        if (!profile_channel_is_ready(tables, output, PDCP_OUTPUT) ||
+            !profile_channel_is_ready(tables, i, PDCP_INPUT) ||
+            (channel->link == PDCP_LINK_ACTIVE && channel->source.channel == output)) {
             continue;
         }
         if (!profile_channel_is_terminal(channel)) {

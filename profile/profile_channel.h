@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 #include "profile_config.h"
 
 /* Flags of the type of an input. */
@@ -18,18 +18,18 @@ uint16_t profile_channel_priority(const pdcp_channel_t *channel);
 
 /* Is this channel on a device that is set up, and does it have this direction (PDCP_INPUT, PDCP_OUTPUT)? The
  * channel may be PDCP_NONE. */
-bool profile_channel_is_ready(const pdcp_nodes_t *nodes, uint8_t channel, uint8_t transfer);
+bool profile_channel_is_ready(const pdcp_tables_t *tables, uint8_t channel, uint8_t transfer);
 
 /* The source of an input that is ready and has an active link; PDCP_NONE: there is none. */
-uint8_t profile_channel_source(const pdcp_nodes_t *nodes, uint8_t input);
+uint8_t profile_channel_source(const pdcp_tables_t *tables, uint8_t input);
 
 /* Would the link give an output a second sole-access input? */
-bool profile_channel_breaks_sole_access(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
+bool profile_channel_breaks_sole_access(const pdcp_tables_t *tables, uint8_t output, uint8_t input);
 
 /* Describes a channel as the end of a link. */
-void profile_channel_end(const pdcp_nodes_t *nodes, uint8_t channel, profile_end_t *end);
+void profile_channel_end(const pdcp_tables_t *tables, uint8_t channel, profile_end_t *end);
 
 /* Describes the source that an input names, which need not be on the bus. False: it names none. */
-bool profile_channel_named_source(const pdcp_nodes_t *nodes, uint8_t input, profile_end_t *end);
+bool profile_channel_named_source(const pdcp_tables_t *tables, uint8_t input, profile_end_t *end);
 
 #endif

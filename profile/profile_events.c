@@ -6,17 +6,17 @@
 #include "profile_channel.h"
 #include "profile_start.h"
 
-static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t place)
 {
     const bool urgent = run->urgent;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
-        if (run->scene.nodes->channels[i].node == node) {
+        if (run->scene.tables->channels[i].place == place) {
             pdcp_bit_set(run->dropping, i, false);
         }
     }
-    pdcp_bit_set(run->scene.awaited, node, false);
+    pdcp_bit_set(run->scene.awaited, place, false);
     if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
-        profile_active_read_back(run, node);
+        profile_active_read_back(run, place);
     }
     if (run->due == 0) {
         run->arrival_ms = now_ms + PROFILE_ARRIVAL_MS;
@@ -29,7 +29,7 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
 static void on_reset(profile_run_t *run, uint32_t now_ms, const pdcp_event_t *event)
 {
     if (event->status == PDCP_OK) {
-        pdcp_bit_set(run->scene.awaited, event->node, true);
+        pdcp_bit_set(run->scene.awaited, event->place, true);
         run->awaited_ms = now_ms + PROFILE_RESET_MS;
     }
 }
@@ -52,10 +52,10 @@ static void ban(profile_run_t *run, uint32_t now_ms, profile_pair_t pair)
  * are there, making the link again counts as the second try. */
 static void on_broken(profile_run_t *run, uint8_t input)
 {
-    const pdcp_nodes_t *nodes = run->scene.nodes;
+    const pdcp_tables_t *tables = run->scene.tables;
     run->plan.want[input] = PDCP_NONE;
-    if (profile_channel_is_ready(nodes, input, PDCP_INPUT) &&
-        profile_channel_is_ready(nodes, nodes->channels[input].source.feed, PDCP_OUTPUT)) {
+    if (profile_channel_is_ready(tables, input, PDCP_INPUT) &&
+        profile_channel_is_ready(tables, tables->channels[input].source.channel, PDCP_OUTPUT)) {
         run->tries = 1;
     }
     profile_run_make_due(run, run->at_events);
@@ -97,21 +97,21 @@ static bool is_unexpected(const profile_run_t *run, uint8_t input)
 {
     return run->making == PROFILE_MAKING
                ? profile_plan_links_differ(&run->plan, &run->scene)
-               : run->scene.nodes->channels[input].source.feed != run->plan.want[input];
+               : run->scene.tables->channels[input].source.channel != run->plan.want[input];
 }
 
 /* A device has asked for the link of its input (Update Data Channel). The link may lack what it requires, so
  * a plan decides whether it stays. If it breaks sole access, it does not even count as working. */
 static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
 {
-    const pdcp_nodes_t *nodes = run->scene.nodes;
-    const pdcp_channel_t *channel = &nodes->channels[input];
+    const pdcp_tables_t *tables = run->scene.tables;
+    const pdcp_channel_t *channel = &tables->channels[input];
     if (entry == PDCP_NONE && profile_active_stood_in_for(run, input) == PDCP_NONE) {
         (void)profile_active_adopt(run, input, false);
     }
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
         pdcp_bit_set(run->scene.made, input,
-                     profile_channel_breaks_sole_access(nodes, channel->source.feed, input));
+                     profile_channel_breaks_sole_access(tables, channel->source.channel, input));
         profile_run_make_due(run, run->at_events);
     }
 }
@@ -133,7 +133,7 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
  * disturbs a link must not get another limb by it (D-PRO-26). */
 static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 {
-    const profile_pair_t pair = {.output = run->scene.nodes->channels[input].source.feed, .input = input};
+    const profile_pair_t pair = {.output = run->scene.tables->channels[input].source.channel, .input = input};
     run->plan.want[input] = PDCP_NONE;
     ban(run, now_ms, pair);
     profile_run_make_due(run, PROFILE_PLAN_SETTLE);
@@ -143,16 +143,16 @@ static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
  * again. */
 static bool is_broken(const profile_run_t *run, uint8_t input)
 {
-    const pdcp_channel_t *channel = &run->scene.nodes->channels[input];
+    const pdcp_channel_t *channel = &run->scene.tables->channels[input];
     return run->state == PROFILE_RUNNING && run->plan.want[input] != PDCP_NONE &&
            channel->link != PDCP_LINK_ACTIVE && (channel->todo & PDCP_TODO_CONNECT) == 0;
 }
 
 /* The link of an input has changed, whoever changed it. The outcome of a link that this layer has asked for
- * comes with PDCP_EVENT_WISH. */
+ * comes with PDCP_EVENT_LINK_REQUEST. */
 static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
 {
-    const uint8_t link = run->scene.nodes->channels[input].link;
+    const uint8_t link = run->scene.tables->channels[input].link;
     const uint8_t entry = profile_active_entry_of(run, input);
     const bool dropping = pdcp_bit(run->dropping, input);
     if (link == PDCP_LINK_NONE) {
@@ -176,7 +176,7 @@ void profile_events_take(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now
 {
     switch (event->kind) {
     case PDCP_EVENT_READY:
-        on_ready(run, arb, now_ms, event->node);
+        on_ready(run, arb, now_ms, event->place);
         break;
     case PDCP_EVENT_SETUP_FAILED:
     case PDCP_EVENT_LOST:
@@ -185,7 +185,7 @@ void profile_events_take(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now
     case PDCP_EVENT_RESET:
         on_reset(run, now_ms, event);
         break;
-    case PDCP_EVENT_WISH:
+    case PDCP_EVENT_LINK_REQUEST:
         if (run->requesting) {
             on_request_end(run, now_ms, (pdcp_status_t)event->status);
         } else {

@@ -136,10 +136,10 @@ uint8_t profile_links_find(const profile_links_t *links, const pdcp_identity_t *
     return PDCP_NONE;
 }
 
-uint8_t profile_links_of(const profile_links_t *links, const pdcp_nodes_t *nodes, uint8_t channel)
+uint8_t profile_links_of(const profile_links_t *links, const pdcp_tables_t *tables, uint8_t channel)
 {
-    const pdcp_channel_t *input = &nodes->channels[channel];
-    return profile_links_find(links, &nodes->nodes[input->node].identity, input->index);
+    const pdcp_channel_t *input = &tables->channels[channel];
+    return profile_links_find(links, &tables->devices[input->place].identity, input->index);
 }
 
 static void get_end(const profile_links_t *links, const profile_ref_t *ref, profile_end_t *end)
@@ -160,25 +160,26 @@ void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link
     get_end(links, &from->input, &link->input);
 }
 
-bool profile_links_name(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end,
+bool profile_links_name(const profile_links_t *links, const pdcp_tables_t *tables, const profile_ref_t *end,
                         uint8_t channel)
 {
-    const pdcp_channel_t *named = &nodes->channels[channel];
-    return names(links, end, &nodes->nodes[named->node].identity, named->index);
+    const pdcp_channel_t *named = &tables->channels[channel];
+    return names(links, end, &tables->devices[named->place].identity, named->index);
 }
 
-uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end)
+uint8_t profile_links_place(const profile_links_t *links, const pdcp_tables_t *tables,
+                            const profile_ref_t *end)
 {
-    return pdcp_nodes_find(nodes, owner_of(links, end));
+    return pdcp_tables_find(tables, owner_of(links, end));
 }
 
-uint8_t profile_links_channel(const profile_links_t *links, const pdcp_nodes_t *nodes,
+uint8_t profile_links_channel(const profile_links_t *links, const pdcp_tables_t *tables,
                               const profile_ref_t *end, uint8_t transfer)
 {
-    const uint8_t place = profile_links_place(links, nodes, end);
+    const uint8_t place = profile_links_place(links, tables, end);
     if (place == PDCP_NONE) {
         return PDCP_NONE;
     }
-    const uint8_t channel = pdcp_nodes_channel(nodes, place, end->index);
-    return profile_channel_is_ready(nodes, channel, transfer) ? channel : PDCP_NONE;
+    const uint8_t channel = pdcp_tables_channel(tables, place, end->index);
+    return profile_channel_is_ready(tables, channel, transfer) ? channel : PDCP_NONE;
 }

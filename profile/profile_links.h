@@ -9,7 +9,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 #include "profile_config.h"
 #include "profile_limits.h"
 
@@ -55,21 +55,21 @@ bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t
 uint8_t profile_links_find(const profile_links_t *links, const pdcp_identity_t *owner, uint8_t index);
 
 /* The same for a channel of the tables. */
-uint8_t profile_links_of(const profile_links_t *links, const pdcp_nodes_t *nodes, uint8_t channel);
+uint8_t profile_links_of(const profile_links_t *links, const pdcp_tables_t *tables, uint8_t channel);
 
 /* Takes an entry out in full. */
 void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link_t *link);
 
 /* Does an end name this channel of the tables? */
-bool profile_links_name(const profile_links_t *links, const pdcp_nodes_t *nodes, const profile_ref_t *end,
+bool profile_links_name(const profile_links_t *links, const pdcp_tables_t *tables, const profile_ref_t *end,
                         uint8_t channel);
 
 /* Place of the device that an end names; PDCP_NONE: it is not bound. */
-uint8_t profile_links_place(const profile_links_t *links, const pdcp_nodes_t *nodes,
+uint8_t profile_links_place(const profile_links_t *links, const pdcp_tables_t *tables,
                             const profile_ref_t *end);
 
 /* Channel number of an end that is there and set up, with this direction; PDCP_NONE: it is missing. */
-uint8_t profile_links_channel(const profile_links_t *links, const pdcp_nodes_t *nodes,
+uint8_t profile_links_channel(const profile_links_t *links, const pdcp_tables_t *tables,
                               const profile_ref_t *end, uint8_t transfer);
 
 #endif

@@ -45,10 +45,10 @@ bool profile_match_precedes(uint16_t profile, const pdcp_identity_t *owner, uint
     return index < than_index;
 }
 
-bool profile_match_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b)
+bool profile_match_is_before(const pdcp_tables_t *tables, uint8_t a, uint8_t b)
 {
-    const pdcp_channel_t *first = &nodes->channels[a];
-    const pdcp_channel_t *second = &nodes->channels[b];
-    return profile_match_precedes(first->profile, &nodes->nodes[first->node].identity, first->index,
-                                  second->profile, &nodes->nodes[second->node].identity, second->index);
+    const pdcp_channel_t *first = &tables->channels[a];
+    const pdcp_channel_t *second = &tables->channels[b];
+    return profile_match_precedes(first->profile, &tables->devices[first->place].identity, first->index,
+                                  second->profile, &tables->devices[second->place].identity, second->index);
 }

@@ -5,7 +5,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 
 /* Candidates have at least the root component of their profiles in common (D-PRO-3). */
 #define PROFILE_CANDIDATE_MIN 8u
@@ -16,7 +16,7 @@ uint8_t profile_match_similarity(uint16_t type_a, uint16_t profile_a, uint16_t t
 
 /* Is channel a before channel b: lower profile, then lower VID, PID, SN, index? The order of channels that
  * are equally alike; it does not depend on where they stand in the tables (D-PRO-3). */
-bool profile_match_is_before(const pdcp_nodes_t *nodes, uint8_t a, uint8_t b);
+bool profile_match_is_before(const pdcp_tables_t *tables, uint8_t a, uint8_t b);
 
 /* The same for a channel with this profile, owner and index and another one. */
 bool profile_match_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index,

@@ -177,7 +177,7 @@ static void do_phase(profile_board_t *board)
 
 static bool is_ready(const profile_scene_t *scene, uint8_t place)
 {
-    return scene->nodes->nodes[place].state == PDCP_NODE_READY;
+    return scene->tables->devices[place].state == PDCP_PLACE_READY;
 }
 
 void profile_plan_begin(profile_board_t *board, const profile_scene_t *scene, uint8_t what)
@@ -206,7 +206,7 @@ bool profile_plan_is_stale(const profile_board_t *board, const profile_scene_t *
 bool profile_plan_step(profile_board_t *board, const profile_scene_t *scene, int16_t effort)
 {
     board->scene = scene;
-    board->nodes = scene->nodes;
+    board->tables = scene->tables;
     board->links = scene->links;
     board->left = effort;
     while (board->phase != PROFILE_PHASE_DONE && board->left > 0) {

@@ -4,10 +4,10 @@
 
 #include "profile_channel.h"
 
-void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms)
+void profile_run_init(profile_run_t *run, const pdcp_tables_t *tables, uint32_t now_ms)
 {
     memset(run, 0, sizeof *run);
-    run->scene.nodes = nodes;
+    run->scene.tables = tables;
     run->scene.links = &run->links;
     run->stirred_ms = now_ms;
 }
@@ -37,7 +37,7 @@ void profile_run_stir(profile_run_t *run, uint32_t now_ms)
 static void leave_unwanted(profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const uint8_t source = profile_channel_source(run->scene.nodes, i);
+        const uint8_t source = profile_channel_source(run->scene.tables, i);
         if (source != PDCP_NONE && source != run->plan.want[i]) {
             pdcp_bit_set(run->scene.made, i, true);
         }
@@ -62,7 +62,8 @@ static void forget_working(profile_run_t *run)
     memset(run->scene.made, 0xFF, sizeof run->scene.made);
     for (uint8_t e = 0; e < run->links.count; e++) {
         const profile_entry_t *entry = &run->links.entries[e];
-        const uint8_t input = profile_links_channel(&run->links, run->scene.nodes, &entry->input, PDCP_INPUT);
+        const uint8_t input =
+            profile_links_channel(&run->links, run->scene.tables, &entry->input, PDCP_INPUT);
         if (entry->by_host && input != PDCP_NONE) {
             pdcp_bit_set(run->scene.made, input, false);
         }

@@ -13,7 +13,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 #include "profile_links.h"
 #include "profile_plan.h"
 
@@ -65,8 +65,8 @@ typedef struct {
     profile_links_t links; /* the active configuration */
 } profile_run_t;
 
-/* nodes: the arbitrator's tables; they must outlive run. */
-void profile_run_init(profile_run_t *run, const pdcp_nodes_t *nodes, uint32_t now_ms);
+/* tables: the arbitrator's; they must outlive run. */
+void profile_run_init(profile_run_t *run, const pdcp_tables_t *tables, uint32_t now_ms);
 
 /* Is a plan due or being carried out? */
 bool profile_run_is_busy(const profile_run_t *run);

@@ -4,15 +4,15 @@
 
 bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
 {
-    const uint8_t place = profile_links_place(scene->links, scene->nodes, end);
+    const uint8_t place = profile_links_place(scene->links, scene->tables, end);
     if (place == PDCP_NONE) {
         return false;
     }
-    const pdcp_node_t *node = &scene->nodes->nodes[place];
-    if (node->state == PDCP_NODE_LOST) {
+    const pdcp_device_entry_t *device = &scene->tables->devices[place];
+    if (device->state == PDCP_PLACE_LOST) {
         return pdcp_bit(scene->awaited, place);
     }
-    return node->state == PDCP_NODE_SETUP && !node->setup_again;
+    return device->state == PDCP_PLACE_SETUP && !device->setup_again;
 }
 
 bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8_t input)
@@ -28,8 +28,8 @@ bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8
 
 uint8_t profile_scene_source(const profile_scene_t *scene, uint8_t input)
 {
-    const uint8_t source = profile_channel_source(scene->nodes, input);
-    if (!profile_channel_is_ready(scene->nodes, source, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
+    const uint8_t source = profile_channel_source(scene->tables, input);
+    if (!profile_channel_is_ready(scene->tables, source, PDCP_OUTPUT) || pdcp_bit(scene->made, input)) {
         return PDCP_NONE;
     }
     return source;

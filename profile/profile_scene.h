@@ -9,7 +9,7 @@
 #include <stdint.h>
 
 #include "pdcp_bits.h"
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 #include "profile_limits.h"
 #include "profile_links.h"
 
@@ -23,7 +23,7 @@ typedef struct {
 } profile_pair_t;
 
 typedef struct {
-    const pdcp_nodes_t *nodes;
+    const pdcp_tables_t *tables;
     profile_links_t *links; /* when the plan is done it sets their stand_in; PROFILE_PLAN_ENFORCE removes
                                entries */
     uint8_t made[PROFILE_CHANNEL_BYTES];  /* bit per input: its link does not count as working, such as

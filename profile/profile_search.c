@@ -19,10 +19,10 @@ static bool is_spare(profile_board_t *board, uint8_t input)
 static bool is_candidate(profile_board_t *board, uint8_t partner, uint8_t channel)
 {
     if (partner != PDCP_NONE && profile_board_channel(board, partner)->transfer == PDCP_INPUT) {
-        return profile_channel_is_ready(board->nodes, channel, PDCP_OUTPUT) &&
+        return profile_channel_is_ready(board->tables, channel, PDCP_OUTPUT) &&
                profile_board_may_link(board, channel, partner);
     }
-    if (!profile_channel_is_ready(board->nodes, channel, PDCP_INPUT)) {
+    if (!profile_channel_is_ready(board->tables, channel, PDCP_INPUT)) {
         return false;
     }
     if (partner == PDCP_NONE) {
@@ -44,7 +44,7 @@ static bool comes_before(const profile_board_t *board, const profile_ref_t *like
 {
     const uint16_t first = score_of(board, like, a);
     const uint16_t second = score_of(board, like, b);
-    return first != second ? first > second : profile_match_is_before(board->nodes, a, b);
+    return first != second ? first > second : profile_match_is_before(board->tables, a, b);
 }
 
 void profile_search_compare(profile_board_t *board, const profile_ref_t *like, uint8_t channel)

@@ -77,7 +77,7 @@ profile_phase_t profile_settle_enforce(profile_board_t *board)
 {
     const uint8_t rival = profile_board_rival_of(board, board->at, board->want[board->at]);
     if (rival != PDCP_NONE) {
-        const uint8_t last = profile_match_is_before(board->nodes, rival, board->at) ? board->at : rival;
+        const uint8_t last = profile_match_is_before(board->tables, rival, board->at) ? board->at : rival;
         profile_board_set_source(board, last, PDCP_NONE);
         pdcp_bit_set(board->scratch.marks.gone, last, true);
         return PROFILE_PHASE_ENFORCE;
@@ -90,7 +90,7 @@ void profile_settle_remove_marked(const profile_board_t *board)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t entry = pdcp_bit(board->scratch.marks.gone, i)
-                                  ? profile_links_of(board->links, board->nodes, i)
+                                  ? profile_links_of(board->links, board->tables, i)
                                   : PDCP_NONE;
         if (entry != PDCP_NONE) {
             profile_links_remove(board->links, entry);

@@ -22,7 +22,7 @@ void profile_start_wait(profile_run_t *run, uint32_t now_ms)
 bool profile_start_is_pending(const profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_WAITING; i++) {
-        if (run->scene.nodes->nodes[i].state == PDCP_NODE_READY) {
+        if (run->scene.tables->devices[i].state == PDCP_PLACE_READY) {
             return true;
         }
     }

@@ -40,17 +40,17 @@ uint8_t arb_call_wait_ready(arb_call_t *call)
 uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes)
 {
     const pdcp_identity_t identity = pdcp_bytes_get_identity(bytes);
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t place = pdcp_nodes_find(nodes, &identity);
-    return pdcp_nodes_is_bound(nodes, place) ? place : (uint8_t)PDCP_NONE;
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
+    const uint8_t place = pdcp_tables_find(tables, &identity);
+    return pdcp_tables_is_bound(tables, place) ? place : (uint8_t)PDCP_NONE;
 }
 
 uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
     const uint8_t number =
-        pdcp_nodes_channel(nodes, call->place[end], call->payload[ARB_CHANNEL_BYTES * end + ARB_AT_INDEX]);
-    return profile_channel_is_ready(nodes, number, transfer) ? number : PDCP_NONE;
+        pdcp_tables_channel(tables, call->place[end], call->payload[ARB_CHANNEL_BYTES * end + ARB_AT_INDEX]);
+    return profile_channel_is_ready(tables, number, transfer) ? number : PDCP_NONE;
 }
 
 uint8_t arb_call_error(int8_t status)

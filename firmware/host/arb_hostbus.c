@@ -11,12 +11,12 @@ enum { PASSTHROUGH = ARB_AT_DATA + CAN_FRAME_DATA_MAX }; /* bytes of the payload
 /* 2201h: number of devices, inputs, outputs, links [API 3.3.2]. */
 uint8_t arb_hostbus_system_info(arb_call_t *call)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
     uint8_t *answer = call->answer;
-    answer[0] = pdcp_nodes_count_devices(nodes);
-    answer[1] = pdcp_nodes_count_channels(nodes, PDCP_INPUT);
-    answer[2] = pdcp_nodes_count_channels(nodes, PDCP_OUTPUT);
-    answer[3] = pdcp_nodes_count_links(nodes);
+    answer[0] = pdcp_tables_count_devices(tables);
+    answer[1] = pdcp_tables_count_channels(tables, PDCP_INPUT);
+    answer[2] = pdcp_tables_count_channels(tables, PDCP_OUTPUT);
+    answer[3] = pdcp_tables_count_links(tables);
     call->answer_len = 4;
     return ARB_OK;
 }
@@ -33,25 +33,26 @@ static void put_info(arb_call_t *call, const pdcp_identity_t *identity, uint8_t 
 /* 2204h [API 3.3.5] */
 uint8_t arb_hostbus_device_info(arb_call_t *call)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t place = pdcp_nodes_nth_device(nodes, call->payload[0]);
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
+    const uint8_t place = pdcp_tables_nth_device(tables, call->payload[0]);
     if (place == PDCP_NONE) {
         return ARB_ERR_NUMBER;
     }
-    const pdcp_node_t *node = &nodes->nodes[place];
-    put_info(call, &node->identity, 0, node->type, node->profile);
+    const pdcp_device_entry_t *device = &tables->devices[place];
+    put_info(call, &device->identity, 0, device->type, device->profile);
     return ARB_OK;
 }
 
 static uint8_t channel_info(arb_call_t *call, uint8_t transfer)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t number = pdcp_nodes_nth_channel(nodes, transfer, call->payload[0]);
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
+    const uint8_t number = pdcp_tables_nth_channel(tables, transfer, call->payload[0]);
     if (number == PDCP_NONE) {
         return ARB_ERR_NUMBER;
     }
-    const pdcp_channel_t *channel = &nodes->channels[number];
-    put_info(call, &nodes->nodes[channel->node].identity, channel->index, channel->type, channel->profile);
+    const pdcp_channel_t *channel = &tables->channels[number];
+    put_info(call, &tables->devices[channel->place].identity, channel->index, channel->type,
+             channel->profile);
     return ARB_OK;
 }
 
@@ -70,12 +71,12 @@ uint8_t arb_hostbus_output_info(arb_call_t *call)
 /* 220Dh: output, input, status [API 3.3.14] */
 uint8_t arb_hostbus_link_info(arb_call_t *call)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t number = pdcp_nodes_nth_link(nodes, call->payload[0]);
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
+    const uint8_t number = pdcp_tables_nth_link(tables, call->payload[0]);
     if (number == PDCP_NONE) {
         return ARB_ERR_NUMBER;
     }
-    arb_hostcodec_put_link(call->answer, nodes, &nodes->channels[number]);
+    arb_hostcodec_put_link(call->answer, tables, &tables->channels[number]);
     call->answer_len = ARB_LINK_BYTES;
     return ARB_OK;
 }
@@ -84,15 +85,15 @@ uint8_t arb_hostbus_link_info(arb_call_t *call)
  * host's own value there would make two devices one, or a link that the tables do not know (D-API-11). */
 static bool is_arbitrators(const arb_call_t *call, uint8_t index, uint8_t param)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
     if (index == 0) {
         return param == PDCP_DEV_NODE_ID;
     }
-    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], index);
-    if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT) {
+    const uint8_t number = pdcp_tables_channel(tables, call->place[0], index);
+    if (number != PDCP_NONE && tables->channels[number].transfer == PDCP_OUTPUT) {
         return param == PDCP_OUT_NODE_ID;
     }
-    const bool is_linked = number == PDCP_NONE || nodes->channels[number].link != PDCP_LINK_NONE;
+    const bool is_linked = number == PDCP_NONE || tables->channels[number].link != PDCP_LINK_NONE;
     return param >= PDCP_IN_SOURCE_VID_PID && param <= PDCP_IN_SOURCE_TYPE &&
            (is_linked || param == PDCP_IN_SOURCE_NODES);
 }
@@ -107,9 +108,9 @@ static uint8_t parameter(arb_call_t *call, bool set)
     const uint8_t place = call->place[0];
     const uint8_t channel = call->payload[ARB_AT_INDEX];
     const uint8_t param = call->payload[ARB_AT_PARAM];
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    if (channel != 0 && nodes->nodes[place].state == PDCP_NODE_READY &&
-        pdcp_nodes_channel(nodes, place, channel) == PDCP_NONE) {
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
+    if (channel != 0 && tables->devices[place].state == PDCP_PLACE_READY &&
+        pdcp_tables_channel(tables, place, channel) == PDCP_NONE) {
         return ARB_ERR_CHANNEL;
     }
     if (set && is_arbitrators(call, channel, param)) {
@@ -136,16 +137,17 @@ uint8_t arb_hostbus_set_parameter(arb_call_t *call)
  * out is one without a node id. */
 static uint8_t error_of_ends(const arb_call_t *call)
 {
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
-    const uint8_t number = pdcp_nodes_channel(nodes, call->place[0], call->payload[ARB_AT_INDEX]);
-    if (number != PDCP_NONE && nodes->channels[number].transfer == PDCP_OUTPUT &&
-        nodes->channels[number].node_id == 0) {
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
+    const uint8_t number = pdcp_tables_channel(tables, call->place[0], call->payload[ARB_AT_INDEX]);
+    if (number != PDCP_NONE && tables->channels[number].transfer == PDCP_OUTPUT &&
+        tables->channels[number].node_id == 0) {
         return ARB_ERR_NO_NODE_ID;
     }
     return ARB_ERR_CHANNEL;
 }
 
-/* 2307h: output channel, input channel [API 3.3.23]. Once started, the bus speaks through PDCP_EVENT_WISH. */
+/* 2307h: output channel, input channel [API 3.3.23]. Once started, the bus speaks through
+ * PDCP_EVENT_LINK_REQUEST. */
 uint8_t arb_hostbus_configure_link(arb_call_t *call)
 {
     if (call->api->turn.started) {
@@ -246,7 +248,7 @@ static void start_resets(arb_call_t *call, uint8_t first, uint8_t last)
 {
     arb_turn_t *turn = &call->api->turn;
     for (uint8_t number = first; number <= last; number++) {
-        const uint8_t place = pdcp_nodes_nth_device(&call->arb->bus.nodes, number);
+        const uint8_t place = pdcp_tables_nth_device(&call->arb->bus.tables, number);
         pdcp_bit_set(turn->asked, place, true);
         turn->open++;
         (void)pdcp_arb_reset(call->arb, call->now_ms, place);
@@ -275,7 +277,7 @@ uint8_t arb_hostbus_reset(arb_call_t *call)
 {
     const arb_turn_t *turn = &call->api->turn;
     if (!turn->started) {
-        const uint8_t count = pdcp_nodes_count_devices(&call->arb->bus.nodes);
+        const uint8_t count = pdcp_tables_count_devices(&call->arb->bus.tables);
         const uint8_t number = call->payload[0];
         if (number > count) {
             return ARB_ERR_NUMBER;
@@ -296,13 +298,14 @@ uint8_t arb_hostbus_reset(arb_call_t *call)
     return ARB_ERR_NO_ANSWER;
 }
 
-/* Wishes and links may also be the planner's; the other events come only of what the host has asked for. */
+/* Link requests and links may also be the planner's; the other events come only of what the host has asked
+ * for. */
 void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event)
 {
     arb_turn_t *turn = &api->turn;
     const uint16_t id = api->held[0].id;
     if (event->kind == PDCP_EVENT_REQUEST ||
-        (event->kind == PDCP_EVENT_WISH && id == ARB_MSG_CONFIGURE_LINK)) {
+        (event->kind == PDCP_EVENT_LINK_REQUEST && id == ARB_MSG_CONFIGURE_LINK)) {
         turn->ended = true;
         turn->status = event->status;
         turn->value_len = event->len;
@@ -311,7 +314,7 @@ void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event)
         turn->status = event->status;
     } else if (event->kind == PDCP_EVENT_RESET) {
         turn->open--;
-        pdcp_bit_set(turn->reset, event->node, event->status == PDCP_OK);
+        pdcp_bit_set(turn->reset, event->place, event->status == PDCP_OK);
     } else if (event->kind == PDCP_EVENT_SILENT) {
         turn->open = 0; /* all devices are forgotten */
     }

@@ -66,10 +66,11 @@ void arb_hostcodec_put_channel(uint8_t bytes[ARB_CHANNEL_BYTES], const pdcp_iden
     bytes[ARB_AT_INDEX] = index;
 }
 
-void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_nodes_t *nodes,
+void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_tables_t *tables,
                             const pdcp_channel_t *input)
 {
     arb_hostcodec_put_channel(&bytes[0], &input->source.identity, input->source.index);
-    arb_hostcodec_put_channel(&bytes[ARB_CHANNEL_BYTES], &nodes->nodes[input->node].identity, input->index);
+    arb_hostcodec_put_channel(&bytes[ARB_CHANNEL_BYTES], &tables->devices[input->place].identity,
+                              input->index);
     bytes[ARB_LINK_BYTES - 1] = input->link;
 }

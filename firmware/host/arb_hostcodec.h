@@ -11,7 +11,7 @@
 #include <stdbool.h>
 #include <stdint.h>
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 
 enum {
     ARB_HOST_SYNC1 = 0xFE,
@@ -85,7 +85,7 @@ void arb_hostcodec_put_channel(uint8_t bytes[ARB_CHANNEL_BYTES], const pdcp_iden
                                uint8_t index);
 
 /* The link of an input as 220Eh and its event tell of it: output, input, status. */
-void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_nodes_t *nodes,
+void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_tables_t *tables,
                             const pdcp_channel_t *input);
 
 #endif

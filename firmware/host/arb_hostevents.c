@@ -47,24 +47,24 @@ void arb_hostevents_end(arb_hostevents_t *events)
 static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                        const pdcp_event_t *event)
 {
-    const pdcp_node_t *node = &arb->bus.nodes.nodes[event->node];
+    const pdcp_device_entry_t *device = &arb->bus.tables.devices[event->place];
     uint8_t *data = put(events, now_ms, event->kind == PDCP_EVENT_BOUND ? ARB_EVENT_BOUND : ARB_EVENT_LOST,
                         ARB_CHANNEL_BYTES);
     if (data != NULL) {
-        arb_hostcodec_put_channel(data, &node->identity, node->node_id);
+        arb_hostcodec_put_channel(data, &device->identity, device->node_id);
     }
 }
 
 /* An input whose link was taken away has no source any more: the job that has done it still knows. */
 static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t number)
 {
-    const pdcp_channel_t *input = &arb->bus.nodes.channels[number];
+    const pdcp_channel_t *input = &arb->bus.tables.channels[number];
     const pdcp_job_t *job = &arb->bus.link.job;
     uint8_t *data = put(events, now_ms, ARB_EVENT_LINK, ARB_EVENT_DATA_MAX);
     if (data == NULL) {
         return;
     }
-    arb_hostcodec_put_link(data, &arb->bus.nodes, input);
+    arb_hostcodec_put_link(data, &arb->bus.tables, input);
     if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
         arb_hostcodec_put_channel(data, &job->old.identity, job->old.index);
     }
@@ -92,11 +92,11 @@ static void put_state(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t 
 static void put_audit(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                       const pdcp_event_t *event)
 {
-    const pdcp_nodes_t *nodes = &arb->bus.nodes;
-    const pdcp_channel_t *channel = &nodes->channels[event->channel];
+    const pdcp_tables_t *tables = &arb->bus.tables;
+    const pdcp_channel_t *channel = &tables->channels[event->channel];
     uint8_t *data = put(events, now_ms, ARB_EVENT_AUDIT, ARB_CHANNEL_BYTES + 1);
     if (data != NULL) {
-        arb_hostcodec_put_channel(data, &nodes->nodes[channel->node].identity, channel->index);
+        arb_hostcodec_put_channel(data, &tables->devices[channel->place].identity, channel->index);
         data[ARB_CHANNEL_BYTES] = (uint8_t)event->status;
     }
 }

@@ -132,14 +132,14 @@ uint8_t arb_hostext_write_configs(arb_call_t *call)
 uint8_t arb_hostext_remove_link(arb_call_t *call)
 {
     arb_turn_t *turn = &call->api->turn;
-    const pdcp_nodes_t *nodes = &call->arb->bus.nodes;
+    const pdcp_tables_t *tables = &call->arb->bus.tables;
     if (turn->started) {
-        if (!profile_channel_is_ready(nodes, turn->channel, PDCP_INPUT) ||
+        if (!profile_channel_is_ready(tables, turn->channel, PDCP_INPUT) ||
             !arb_call_wait(call, ARB_HOST_ANSWER_MS)) {
             return ARB_ERR_NO_ANSWER;
         }
-        return nodes->channels[turn->channel].link == PDCP_LINK_NONE ? arb_call_error(turn->status)
-                                                                     : ARB_PENDING;
+        return tables->channels[turn->channel].link == PDCP_LINK_NONE ? arb_call_error(turn->status)
+                                                                      : ARB_PENDING;
     }
     turn->channel = arb_call_channel(call, 0, PDCP_INPUT);
     if (turn->channel == PDCP_NONE) {

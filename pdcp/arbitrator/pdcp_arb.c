@@ -94,12 +94,12 @@ static bool is_from_device(uint8_t code)
     return is_in((code & PDCP_ANSWER) != 0 ? answers : requests, code);
 }
 
-static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
+static void on_message(pdcp_arb_t *arb, uint8_t place, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
     pdcp_reply_t reply;
     pdcp_role_on_device_frame(arb, frame);
-    bool replied = pdcp_request_on_frame(&arb->bus, node, frame, &reply);
+    bool replied = pdcp_request_on_frame(&arb->bus, place, frame, &reply);
     if (!replied) {
         const pdcp_decode_t decoded = pdcp_codec_decode(frame, &msg);
         if (decoded == PDCP_DECODE_UNKNOWN_CODE) {
@@ -112,28 +112,28 @@ static void on_message(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
             pdcp_bus_count(&arb->bus, PDCP_STAT_DROP_DIRECTION);
         } else if (msg.code == PDCP_UPDATE_CHANNEL) {
             pdcp_bus_count(&arb->bus, PDCP_STAT_TAKEN);
-            pdcp_link_on_update(&arb->bus, node, msg.channel);
+            pdcp_link_on_update(&arb->bus, place, msg.channel);
         } else {
-            replied = pdcp_request_on_message(&arb->bus, node, &msg, &reply);
+            replied = pdcp_request_on_message(&arb->bus, place, &msg, &reply);
         }
     }
     if (replied) {
-        pdcp_life_on_reply(arb, node, &reply);
-        pdcp_life_serve(arb, node);
+        pdcp_life_on_reply(arb, place, &reply);
+        pdcp_life_serve(arb, place);
     }
 }
 
-/* A frame on the id of an output. It is a stranger's if the output's device is lost, or the output was told
- * to be silent and has had time to be: then it says nothing of the owner, and the output gets another id
+/* A frame on the id of an output. It is an unknown device's if the output's device is lost, or the output was
+ * told to be silent and has had time to be: then it says nothing of the owner, and the output gets another id
  * before it is enabled (D-BUS-36, D-BUS-46). */
-static bool on_channel_data(pdcp_arb_t *arb, uint8_t node, const can_frame_t *frame)
+static bool on_channel_data(pdcp_arb_t *arb, uint8_t place, const can_frame_t *frame)
 {
-    pdcp_node_t *device = pdcp_arb_device(arb, node);
+    pdcp_device_entry_t *device = pdcp_arb_device(arb, place);
     pdcp_channel_t *output =
-        &arb->bus.nodes.channels[pdcp_nodes_output(&arb->bus.nodes, node, pdcp_id_node(frame->id))];
-    const bool is_silenced = device->state == PDCP_NODE_READY && !output->enabled &&
+        &arb->bus.tables.channels[pdcp_tables_output(&arb->bus.tables, place, pdcp_id_node(frame->id))];
+    const bool is_silenced = device->state == PDCP_PLACE_READY && !output->enabled &&
                              arb->bus.now_ms - arb->bus.silenced_ms >= PDCP_FADING_MS;
-    if (is_silenced || device->state == PDCP_NODE_LOST) {
+    if (is_silenced || device->state == PDCP_PLACE_LOST) {
         pdcp_bind_take_output_id(&arb->bus, output);
         return on_unknown(arb, frame);
     }
@@ -161,28 +161,28 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
         pdcp_hold_on_frame(arb, frame);
         return true;
     }
-    uint8_t node;
-    const bool is_device = pdcp_nodes_owner(&arb->bus.nodes, pdcp_id_node(frame->id), &node);
-    if (node >= PDCP_DEVICES_MAX) {
+    uint8_t place;
+    const bool is_device = pdcp_tables_owner(&arb->bus.tables, pdcp_id_node(frame->id), &place);
+    if (place >= PDCP_DEVICES_MAX) {
         return on_unknown(arb, frame);
     }
-    pdcp_node_t *device = pdcp_arb_device(arb, node);
+    pdcp_device_entry_t *device = pdcp_arb_device(arb, place);
     if (!is_device) {
-        return on_channel_data(arb, node, frame);
+        return on_channel_data(arb, place, frame);
     }
     device->heard_ms = now_ms; /* any frame counts as life; the deadline moves when it fires */
     bool due = true;
     if (pdcp_codec_is_beacon(frame)) { /* by far the most frequent: without decoding */
         pdcp_bus_count(&arb->bus, PDCP_STAT_TAKEN);
-        due = !device->beaconed || device->state == PDCP_NODE_LOST;
+        due = !device->beaconed || device->state == PDCP_PLACE_LOST;
         if (due) {
             pdcp_life_on_first_beacon(arb, device);
         }
     } else {
-        on_message(arb, node, frame);
+        on_message(arb, place, frame);
     }
     if (device->asked_again) {
-        pdcp_life_end_check(arb, node);
+        pdcp_life_end_check(arb, place);
         due = true;
     }
     return due;
@@ -217,12 +217,12 @@ static void on_audit_deadline(pdcp_arb_t *arb)
     pdcp_audit_on_deadline(&arb->bus, calm);
 }
 
-static void on_life_deadline(pdcp_arb_t *arb, uint8_t node)
+static void on_life_deadline(pdcp_arb_t *arb, uint8_t place)
 {
-    if (pdcp_arb_device(arb, node)->state == PDCP_NODE_ASKED) {
-        pdcp_hold_on_deadline(arb, node);
+    if (pdcp_arb_device(arb, place)->state == PDCP_PLACE_ASKED) {
+        pdcp_hold_on_deadline(arb, place);
     } else {
-        pdcp_life_on_deadline(arb, node);
+        pdcp_life_on_deadline(arb, place);
     }
 }
 
@@ -269,7 +269,7 @@ uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
         on_deadline(arb, timer);
     }
     if (arb->host.waiting) {
-        pdcp_life_serve(arb, arb->host.node);
+        pdcp_life_serve(arb, arb->host.place);
     }
     pdcp_link_step(&arb->bus);
     pdcp_host_limit_wait(&arb->bus, &arb->host);
@@ -320,27 +320,27 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb)
 
 /* --- The host's requests --- */
 
-pdcp_status_t pdcp_arb_get(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
+pdcp_status_t pdcp_arb_get(pdcp_arb_t *arb, uint8_t place, uint8_t channel, uint8_t param, uint8_t *bytes,
                            uint16_t size)
 {
-    return pdcp_host_ask(&arb->bus, &arb->host, node, channel, param, bytes, size, PDCP_GET_PARAMETER);
+    return pdcp_host_ask(&arb->bus, &arb->host, place, channel, param, bytes, size, PDCP_GET_PARAMETER);
 }
 
-pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t node, uint8_t channel, uint8_t param, uint8_t *bytes,
+pdcp_status_t pdcp_arb_set(pdcp_arb_t *arb, uint8_t place, uint8_t channel, uint8_t param, uint8_t *bytes,
                            uint16_t size)
 {
-    return pdcp_host_ask(&arb->bus, &arb->host, node, channel, param, bytes, size, PDCP_SET_PARAMETER);
+    return pdcp_host_ask(&arb->bus, &arb->host, place, channel, param, bytes, size, PDCP_SET_PARAMETER);
 }
 
-pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t node, uint8_t code, uint16_t time_ms)
+pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t place, uint8_t code, uint16_t time_ms)
 {
-    return pdcp_host_ask(&arb->bus, &arb->host, node, 0, 0, NULL, time_ms, code);
+    return pdcp_host_ask(&arb->bus, &arb->host, place, 0, 0, NULL, time_ms, code);
 }
 
-pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t node, uint8_t *data, uint8_t dlc)
+pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t place, uint8_t *data, uint8_t dlc)
 {
     const pdcp_status_t status =
-        pdcp_host_ask(&arb->bus, &arb->host, node, data[2], data[1], data, dlc, data[0]);
+        pdcp_host_ask(&arb->bus, &arb->host, place, data[2], data[1], data, dlc, data[0]);
     if (status == PDCP_OK) {
         arb->host.client = PDCP_CLIENT_RAW;
     }
@@ -366,14 +366,14 @@ bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
     return true;
 }
 
-bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t node)
+bool pdcp_arb_reset(pdcp_arb_t *arb, uint32_t now_ms, uint8_t place)
 {
     arb->bus.now_ms = now_ms;
-    if (!pdcp_nodes_is_bound(&arb->bus.nodes, node)) {
+    if (!pdcp_tables_is_bound(&arb->bus.tables, place)) {
         return false;
     }
-    pdcp_arb_device(arb, node)->reset_asked = true;
-    pdcp_life_serve(arb, node);
+    pdcp_arb_device(arb, place)->reset_asked = true;
+    pdcp_life_serve(arb, place);
     return true;
 }
 
@@ -392,18 +392,18 @@ void pdcp_arb_withdraw_resets(pdcp_arb_t *arb, uint32_t now_ms)
 
 static pdcp_status_t connect(pdcp_arb_t *arb, uint8_t output, uint8_t input, bool sole)
 {
-    const pdcp_channel_t *channels = arb->bus.nodes.channels;
+    const pdcp_channel_t *channels = arb->bus.tables.channels;
     if (output >= PDCP_CHANNELS_MAX || input >= PDCP_CHANNELS_MAX ||
         channels[output].transfer != PDCP_OUTPUT || channels[input].transfer != PDCP_INPUT) {
         return PDCP_ERR_UNKNOWN;
     }
-    if (channels[output].node == channels[input].node) {
+    if (channels[output].place == channels[input].place) {
         return PDCP_ERR_OWN;
     }
-    if (sole && pdcp_nodes_rival(&arb->bus.nodes, output, input) != PDCP_NONE) {
+    if (sole && pdcp_tables_rival(&arb->bus.tables, output, input) != PDCP_NONE) {
         return PDCP_ERR_SOLE;
     }
-    return pdcp_link_wish(&arb->bus, output, input, sole);
+    return pdcp_link_request(&arb->bus, output, input, sole);
 }
 
 pdcp_status_t pdcp_arb_connect(pdcp_arb_t *arb, uint8_t output, uint8_t input)
@@ -418,7 +418,7 @@ pdcp_status_t pdcp_arb_connect_sole(pdcp_arb_t *arb, uint8_t output, uint8_t inp
 
 bool pdcp_arb_disconnect(pdcp_arb_t *arb, uint8_t input)
 {
-    const pdcp_channel_t *channels = arb->bus.nodes.channels;
+    const pdcp_channel_t *channels = arb->bus.tables.channels;
     if (input >= PDCP_CHANNELS_MAX || channels[input].link == PDCP_LINK_NONE) {
         return false;
     }
@@ -432,16 +432,16 @@ void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored)
     arb->bus.link.stored = stored;
 }
 
-void pdcp_arb_rest(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
+void pdcp_arb_deactivate(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     arb->bus.now_ms = now_ms;
-    pdcp_link_rest(&arb->bus, input, PDCP_OK);
+    pdcp_link_deactivate(&arb->bus, input, PDCP_OK);
 }
 
 void pdcp_arb_remember(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input, const pdcp_identity_t *owner,
                        uint8_t index, uint16_t type, uint16_t profile)
 {
-    pdcp_channel_t *channel = &arb->bus.nodes.channels[input];
+    pdcp_channel_t *channel = &arb->bus.tables.channels[input];
     arb->bus.now_ms = now_ms;
     channel->source.identity = *owner;
     channel->source.index = index;
@@ -479,8 +479,8 @@ bool pdcp_arb_link_running(const pdcp_arb_t *arb)
 bool pdcp_arb_setup_running(const pdcp_arb_t *arb)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        const pdcp_node_t *node = &arb->bus.nodes.nodes[i];
-        if (node->state == PDCP_NODE_SETUP && !node->setup_again) {
+        const pdcp_device_entry_t *device = &arb->bus.tables.devices[i];
+        if (device->state == PDCP_PLACE_SETUP && !device->setup_again) {
             return true;
         }
     }

@@ -34,9 +34,9 @@ typedef struct {
 } pdcp_arb_t;
 
 /* The device at this place, which must be one. */
-static inline pdcp_node_t *pdcp_arb_device(pdcp_arb_t *arb, uint8_t node)
+static inline pdcp_device_entry_t *pdcp_arb_device(pdcp_arb_t *arb, uint8_t place)
 {
-    return pdcp_bus_node(&arb->bus, node);
+    return pdcp_bus_device(&arb->bus, place);
 }
 
 #endif

@@ -31,11 +31,11 @@ void pdcp_audit_init(pdcp_bus_t *bus)
     }
 }
 
-void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node)
+void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t place)
 {
     for (unsigned at = 0; at < WALK_END; at++) {
         const uint8_t number = (uint8_t)(at % PDCP_CHANNELS_MAX);
-        if (bus->nodes.channels[number].node == node) {
+        if (bus->tables.channels[number].place == place) {
             pdcp_bit_set(bus->audit.refused[at / PDCP_CHANNELS_MAX], number, false);
         }
     }
@@ -47,9 +47,9 @@ void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node)
 
 void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id)
 {
-    uint8_t node;
-    if (pdcp_nodes_owner(&bus->nodes, node_id, &node) && node != PDCP_NONE) {
-        pdcp_bit_set(bus->audit.hurried, node, true);
+    uint8_t place;
+    if (pdcp_tables_owner(&bus->tables, node_id, &place) && place != PDCP_NONE) {
+        pdcp_bit_set(bus->audit.hurried, place, true);
     }
 }
 
@@ -71,7 +71,7 @@ static uint8_t param_of(const pdcp_channel_t *channel, uint8_t kind)
 /* Is the channel an end of an active link? */
 static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
 {
-    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_channel_t *channel = &bus->tables.channels[number];
     if (!is_output(channel)) {
         return channel->link == PDCP_LINK_ACTIVE;
     }
@@ -83,13 +83,13 @@ static bool is_linked(const pdcp_bus_t *bus, uint8_t number)
 static bool is_source_asked(const pdcp_channel_t *input, uint8_t kind)
 {
     return input->link != PDCP_LINK_NONE ||
-           (kind == PDCP_AUDIT_SERIAL && !pdcp_nodes_is_named(input->source.index));
+           (kind == PDCP_AUDIT_SERIAL && !pdcp_tables_is_named(input->source.index));
 }
 
 /* Is this question asked on this walk? */
 static bool is_asked(const pdcp_bus_t *bus, uint8_t number, uint8_t kind, pdcp_audit_walk_t walk)
 {
-    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_channel_t *channel = &bus->tables.channels[number];
     if (kind <= PDCP_AUDIT_NODES && is_linked(bus, number)) {
         return walk != PDCP_AUDIT_SPARE;
     }
@@ -99,22 +99,22 @@ static bool is_asked(const pdcp_bus_t *bus, uint8_t number, uint8_t kind, pdcp_a
     return !is_output(channel) && bus->link.planned && is_source_asked(channel, kind);
 }
 
-static bool may_ask(pdcp_bus_t *bus, uint8_t node)
+static bool may_ask(pdcp_bus_t *bus, uint8_t place)
 {
-    return node != PDCP_NONE && pdcp_bus_node(bus, node)->state == PDCP_NODE_READY &&
-           pdcp_request_is_idle(bus, node);
+    return place != PDCP_NONE && pdcp_bus_device(bus, place)->state == PDCP_PLACE_READY &&
+           pdcp_request_is_idle(bus, place);
 }
 
 static void ask(pdcp_bus_t *bus, uint8_t number, uint8_t kind)
 {
-    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_channel_t *channel = &bus->tables.channels[number];
     bus->link.changed = false;
     bus->audit.asked = number;
     bus->audit.asked_kind = kind;
-    bus->audit.asked_place = channel->node;
-    pdcp_request_get(bus, channel->node, PDCP_CLIENT_AUDIT, channel->index, param_of(channel, kind),
+    bus->audit.asked_place = channel->place;
+    pdcp_request_get(bus, channel->place, PDCP_CLIENT_AUDIT, channel->index, param_of(channel, kind),
                      PDCP_VALUE_MAX);
-    pdcp_request_limit_tries(bus, channel->node, 1);
+    pdcp_request_limit_tries(bus, channel->place, 1);
 }
 
 /* Asks what comes next on a walk. False: it is at its end, and begins anew. */
@@ -124,9 +124,9 @@ static bool ask_on(pdcp_bus_t *bus, pdcp_audit_walk_t walk)
     while (audit->at[walk] < WALK_END) {
         const uint8_t number = (uint8_t)(audit->at[walk] % PDCP_CHANNELS_MAX);
         const uint8_t kind = (uint8_t)(audit->at[walk] / PDCP_CHANNELS_MAX);
-        const uint8_t node = bus->nodes.channels[number].node;
+        const uint8_t place = bus->tables.channels[number].place;
         audit->at[walk]++;
-        if ((walk != PDCP_AUDIT_HURRY || node == audit->first) && may_ask(bus, node) &&
+        if ((walk != PDCP_AUDIT_HURRY || place == audit->first) && may_ask(bus, place) &&
             !pdcp_bit(audit->refused[kind], number) && is_asked(bus, number, kind, walk)) {
             ask(bus, number, kind);
             return true;
@@ -173,8 +173,9 @@ static void ask_next(pdcp_bus_t *bus)
 
 static bool is_asking(pdcp_bus_t *bus)
 {
-    const uint8_t node = bus->audit.asked_place;
-    return !pdcp_request_is_idle(bus, node) && pdcp_bus_node(bus, node)->request.client == PDCP_CLIENT_AUDIT;
+    const uint8_t place = bus->audit.asked_place;
+    return !pdcp_request_is_idle(bus, place) &&
+           pdcp_bus_device(bus, place)->request.client == PDCP_CLIENT_AUDIT;
 }
 
 /* Without devices an arbitrator sleeps from beacon to beacon. */
@@ -184,7 +185,7 @@ void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
     if (audit->window != 0 && --audit->window == 0) {
         memset(audit->found, 0, sizeof audit->found);
     }
-    audit->asleep = audit->window == 0 && pdcp_nodes_count_state(&bus->nodes, PDCP_NODE_READY) == 0;
+    audit->asleep = audit->window == 0 && pdcp_tables_count_state(&bus->tables, PDCP_PLACE_READY) == 0;
     if (audit->asleep) {
         return;
     }
@@ -199,7 +200,7 @@ void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm)
 /* Does the value say what the tables say? An output without a link may be the host's (D-BUS-60). */
 static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
 {
-    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_channel_t *channel = &bus->tables.channels[number];
     const uint8_t first = pdcp_bytes_value_u8(reply->bytes, reply->len, 0);
     if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
         return first == 0 || (is_output(channel) && channel->enabled); /* by the host, who reads it */
@@ -211,14 +212,14 @@ static bool agrees(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply)
         return first == channel->node_id;
     }
     if (bus->audit.asked_kind == PDCP_AUDIT_NODES) {
-        const pdcp_channel_t *source = &bus->nodes.channels[channel->source.feed];
-        return first == pdcp_bus_node(bus, source->node)->node_id &&
+        const pdcp_channel_t *source = &bus->tables.channels[channel->source.channel];
+        return first == pdcp_bus_device(bus, source->place)->node_id &&
                pdcp_bytes_value_u8(reply->bytes, reply->len, 1) == source->node_id;
     }
     return channel->link != PDCP_LINK_NONE
-               ? pdcp_nodes_is_source(channel, reply->param, pdcp_request_word(reply, 0),
-                                      pdcp_request_word(reply, 2))
-               : !pdcp_nodes_is_named(pdcp_bytes_value_u8(reply->bytes, reply->len, 2));
+               ? pdcp_tables_is_source(channel, reply->param, pdcp_request_word(reply, 0),
+                                       pdcp_request_word(reply, 2))
+               : !pdcp_tables_is_named(pdcp_bytes_value_u8(reply->bytes, reply->len, 2));
 }
 
 /* Counts a difference. Returns how many of its kind there are in the minute under way, which begins with the
@@ -248,7 +249,7 @@ static uint8_t count_difference(pdcp_audit_t *audit, uint8_t number, bool source
 static void let_go(pdcp_bus_t *bus, uint8_t number, uint8_t input)
 {
     while (input != PDCP_NONE) {
-        pdcp_link_rest(bus, input, PDCP_ERR_DIFFERS);
+        pdcp_link_deactivate(bus, input, PDCP_ERR_DIFFERS);
         input = pdcp_ends_listener(bus, number);
     }
 }
@@ -256,7 +257,7 @@ static void let_go(pdcp_bus_t *bus, uint8_t number, uint8_t input)
 /* Repairs what differs. An output stands for the first of its links. */
 static void on_difference(pdcp_bus_t *bus, uint8_t number)
 {
-    const pdcp_channel_t *channel = &bus->nodes.channels[number];
+    const pdcp_channel_t *channel = &bus->tables.channels[number];
     const uint8_t kind = bus->audit.asked_kind;
     const bool source = kind > PDCP_AUDIT_NODES;
     const bool linked = is_linked(bus, number);
@@ -288,6 +289,6 @@ void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
         on_difference(bus, number);
     } else if (bus->audit.asked_kind == PDCP_AUDIT_ENABLED && !is_linked(bus, number)) {
         /* What was to be disabled may have refused that before. */
-        bus->nodes.channels[number].enabled = pdcp_bytes_value_u8(reply->bytes, reply->len, 0) != 0;
+        bus->tables.channels[number].enabled = pdcp_bytes_value_u8(reply->bytes, reply->len, 0) != 0;
     }
 }

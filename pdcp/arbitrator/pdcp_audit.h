@@ -31,7 +31,7 @@ void pdcp_audit_init(pdcp_bus_t *bus);
 void pdcp_audit_begin(pdcp_bus_t *bus);
 
 /* A device is set up: it is asked again what it has refused. */
-void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t node);
+void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t place);
 
 /* Somebody else has spoken to the device with this node id in the name of an arbitrator: it goes first. */
 void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id);

@@ -108,7 +108,7 @@ void pdcp_bind_on_time(pdcp_bus_t *bus)
 
 static bool is_free(const pdcp_bus_t *bus, uint8_t id)
 {
-    if (!is_node_id(id) || bus->nodes.owner[id] != 0) {
+    if (!is_node_id(id) || bus->tables.owner[id] != 0) {
         return false;
     }
     for (uint8_t i = 0; i < PDCP_RESERVED_MAX; i++) {
@@ -124,7 +124,7 @@ static bool is_free(const pdcp_bus_t *bus, uint8_t id)
 static bool is_quiet(const pdcp_bus_t *bus, uint8_t id)
 {
     return pdcp_unknown_silence(&bus->unknown, id) == PDCP_UNKNOWN_QUIET &&
-           !pdcp_nodes_may_hear(&bus->nodes, id);
+           !pdcp_tables_may_hear(&bus->tables, id);
 }
 
 static uint8_t next_id(uint8_t id, int8_t step)
@@ -212,11 +212,11 @@ static pdcp_bind_result_t offer(pdcp_bus_t *bus, const pdcp_identity_t *identity
     return PDCP_BIND_GRANTED;
 }
 
-void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_node_t *device)
+void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
     if (remembered_id(&bus->bind, &device->identity) != device->node_id) {
         remember(&bus->bind, &device->identity, device->node_id);
-        pdcp_bus_tell_node(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
+        pdcp_bus_tell_device(bus, PDCP_EVENT_IDENTITIES, PDCP_NONE);
     }
 }
 
@@ -234,20 +234,20 @@ static bool is_crowded(const pdcp_bus_t *bus)
         return false;
     }
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        const pdcp_node_t *node = &bus->nodes.nodes[i];
-        places =
-            (uint8_t)(places + (node->state != PDCP_NODE_FREE && !pdcp_bind_is_known(bus, &node->identity)));
+        const pdcp_device_entry_t *device = &bus->tables.devices[i];
+        places = (uint8_t)(places +
+                           (device->state != PDCP_PLACE_FREE && !pdcp_bind_is_known(bus, &device->identity)));
     }
     return places >= PDCP_UNKNOWN_PLACES;
 }
 
 pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
-                                        uint8_t *node)
+                                        uint8_t *place)
 {
-    *node = pdcp_nodes_find(&bus->nodes, identity);
-    if (*node != PDCP_NONE) {
-        pdcp_node_t *known = &bus->nodes.nodes[*node];
-        if (known->state == PDCP_NODE_LOST) { /* it gets its old id and no other */
+    *place = pdcp_tables_find(&bus->tables, identity);
+    if (*place != PDCP_NONE) {
+        pdcp_device_entry_t *known = &bus->tables.devices[*place];
+        if (known->state == PDCP_PLACE_LOST) { /* it gets its old id and no other */
             return offer(bus, identity, asked, known->node_id);
         }
         known->asked_again = true;
@@ -255,32 +255,32 @@ pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *
         return PDCP_BIND_CHECK;
     }
     /* Without a place nothing is given back. With one, an id that is reserved is there to be had. */
-    uint8_t place = pdcp_nodes_free_place(&bus->nodes);
+    uint8_t free_place = pdcp_tables_free_place(&bus->tables);
     if (!pdcp_bind_is_known(bus, identity) && is_crowded(bus)) {
-        place = PDCP_NONE;
+        free_place = PDCP_NONE;
     }
-    const uint8_t id = place != PDCP_NONE ? choose_id(bus, identity, asked) : 0;
+    const uint8_t id = free_place != PDCP_NONE ? choose_id(bus, identity, asked) : 0;
     if (id == 0) {
         answer(bus, identity, asked, PDCP_NODE_REFUSED, PDCP_STAT_BIND_REFUSED);
-        pdcp_bus_tell_node(bus, PDCP_EVENT_REFUSED, PDCP_NONE);
+        pdcp_bus_tell_device(bus, PDCP_EVENT_REFUSED, PDCP_NONE);
         return PDCP_BIND_REFUSED;
     }
     if (id == asked) {
-        *node = place;
-        pdcp_nodes_add(&bus->nodes, place, identity, asked);
+        *place = free_place;
+        pdcp_tables_add(&bus->tables, free_place, identity, asked);
     }
     return offer(bus, identity, asked, id);
 }
 
-pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t node, bool answered)
+pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t place, bool answered)
 {
-    pdcp_node_t *known = &bus->nodes.nodes[node];
+    pdcp_device_entry_t *known = &bus->tables.devices[place];
     known->asked_again = false;
     if (!answered) {
         return offer(bus, &known->identity, known->asked_id, known->node_id);
     }
     answer(bus, &known->identity, known->asked_id, PDCP_NODE_REFUSED, PDCP_STAT_BIND_DUPLICATE);
-    pdcp_bus_tell_node(bus, PDCP_EVENT_DUPLICATE, node);
+    pdcp_bus_tell_device(bus, PDCP_EVENT_DUPLICATE, place);
     return PDCP_BIND_REFUSED;
 }
 
@@ -300,7 +300,7 @@ bool pdcp_bind_give_output_id(pdcp_bus_t *bus, pdcp_channel_t *output)
     if (id == 0) {
         return false;
     }
-    pdcp_nodes_set_output_id(&bus->nodes, output, id);
+    pdcp_tables_set_output_id(&bus->tables, output, id);
     bus->bind.output_id = next_id(id, -1);
     return true;
 }
@@ -308,5 +308,5 @@ bool pdcp_bind_give_output_id(pdcp_bus_t *bus, pdcp_channel_t *output)
 void pdcp_bind_take_output_id(pdcp_bus_t *bus, pdcp_channel_t *output)
 {
     pdcp_unknown_note(&bus->unknown, bus->now_ms, output->node_id);
-    pdcp_nodes_set_output_id(&bus->nodes, output, 0);
+    pdcp_tables_set_output_id(&bus->tables, output, 0);
 }

@@ -13,7 +13,7 @@
 
 /* What came of a bind request. */
 typedef enum {
-    PDCP_BIND_GRANTED,   /* node holds the device's place, new or taken back */
+    PDCP_BIND_GRANTED,   /* place holds the device's place, new or taken back */
     PDCP_BIND_SUGGESTED, /* it has to ask again */
     PDCP_BIND_REFUSED,   /* no node id or no place is left */
     PDCP_BIND_CHECK      /* its identity is bound: find out whether that device still answers, then see
@@ -34,19 +34,19 @@ bool pdcp_bind_remember_stored(pdcp_bind_t *bind, const pdcp_remembered_t *entry
 bool pdcp_bind_is_known(const pdcp_bus_t *bus, const pdcp_identity_t *identity);
 
 /* A device is set up: it is remembered with its id (D-BUS-43). */
-void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_node_t *device);
+void pdcp_bind_on_ready(pdcp_bus_t *bus, const pdcp_device_entry_t *device);
 
 /* Frees reservations that are over; to be called every few days at least. */
 void pdcp_bind_on_time(pdcp_bus_t *bus);
 
 /* A bind request with node id asked. Answers it, unless the result is PDCP_BIND_CHECK. */
 pdcp_bind_result_t pdcp_bind_on_request(pdcp_bus_t *bus, const pdcp_identity_t *identity, uint8_t asked,
-                                        uint8_t *node);
+                                        uint8_t *place);
 
 /* The check of a bound device is over. It answered: the asking device is another one, refuse it with id 0. It
  * did not: it was reset and is granted its id again (or suggested it). Answers the request that
  * pdcp_bind_on_request left open. */
-pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t node, bool answered);
+pdcp_bind_result_t pdcp_bind_after_check(pdcp_bus_t *bus, uint8_t place, bool answered);
 
 /* Is no output given an id at this time, because somebody may still speak on any or listen to it (D-BUS-36,
  * D-BUS-48)? */

@@ -1,8 +1,8 @@
 #include "pdcp_bus.h"
 
-pdcp_node_t *pdcp_bus_node(pdcp_bus_t *bus, uint8_t node)
+pdcp_device_entry_t *pdcp_bus_device(pdcp_bus_t *bus, uint8_t place)
 {
-    return &bus->nodes.nodes[node];
+    return &bus->tables.devices[place];
 }
 
 uint32_t pdcp_bus_age_ms(const pdcp_bus_t *bus)
@@ -38,16 +38,16 @@ bool pdcp_bus_send_word(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, uint
     return pdcp_bus_send(bus, priority, node_id, &msg);
 }
 
-static void tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, uint8_t channel,
+static void tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place, uint8_t channel,
                  pdcp_status_t status)
 {
-    const pdcp_event_t event = {.kind = kind, .node = node, .channel = channel, .status = (int8_t)status};
+    const pdcp_event_t event = {.kind = kind, .place = place, .channel = channel, .status = (int8_t)status};
     bus->on_event(bus->event_ctx, bus->now_ms, &event);
 }
 
-void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status)
+void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place, pdcp_status_t status)
 {
-    tell(bus, kind, node, PDCP_NONE, status);
+    tell(bus, kind, place, PDCP_NONE, status);
 }
 
 void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status)
@@ -60,7 +60,7 @@ void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat)
     bus->stats[stat]++;
 }
 
-void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node)
+void pdcp_bus_tell_device(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place)
 {
-    pdcp_bus_tell(bus, kind, node, PDCP_OK);
+    pdcp_bus_tell(bus, kind, place, PDCP_OK);
 }

@@ -5,35 +5,35 @@
 #define PDCP_BUS_H
 
 #include "pdcp_codec.h"
-#include "pdcp_nodes.h"
 #include "pdcp_parts.h"
 #include "pdcp_stats.h"
+#include "pdcp_tables.h"
 #include "pdcp_timers.h"
 #include "pdcp_txq.h"
 #include "pdcp_unknown.h"
 
 typedef enum {
-    PDCP_EVENT_BOUND,        /* node: first beacon of a device, it counts from now on */
-    PDCP_EVENT_READY,        /* node: its setup has ended well */
-    PDCP_EVENT_SETUP_FAILED, /* node: it stays bound but unlinked */
-    PDCP_EVENT_LOST,         /* node: silent for three beacon intervals */
+    PDCP_EVENT_BOUND,        /* place: first beacon of a device, it counts from now on */
+    PDCP_EVENT_READY,        /* place: its setup has ended well */
+    PDCP_EVENT_SETUP_FAILED, /* place: it stays bound but unlinked */
+    PDCP_EVENT_LOST,         /* place: silent for three beacon intervals */
     PDCP_EVENT_REFUSED,      /* a device was refused: no node id or no place left */
-    PDCP_EVENT_DUPLICATE,    /* node: a second device claims its identity and was refused */
+    PDCP_EVENT_DUPLICATE,    /* place: a second device claims its identity and was refused */
     PDCP_EVENT_IDENTITIES,   /* the table of remembered identities has changed */
-    PDCP_EVENT_LINK,    /* channel (an input): its link has changed; status: PDCP_OK or why it was not made */
-    PDCP_EVENT_WISH,    /* channel: the link that the host asked for is made, or status says why not */
-    PDCP_EVENT_RESET,   /* node: the reset that was asked for has ended with status */
-    PDCP_EVENT_FOREIGN, /* another arbitrator is heard; this one stays (D-BUS-12) */
-    PDCP_EVENT_SILENT,  /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
-    PDCP_EVENT_STARTED, /* and has started afresh */
-    PDCP_EVENT_STATE,   /* the bus has another state; status holds it (pdcp_bus_state_t) */
-    PDCP_EVENT_AUDIT,   /* channel: a parameter differs from the tables; status holds its id (D-BUS-40) */
-    PDCP_EVENT_REQUEST  /* node: the host's request has ended with status; len bytes of value */
+    PDCP_EVENT_LINK, /* channel (an input): its link has changed; status: PDCP_OK or why it was not made */
+    PDCP_EVENT_LINK_REQUEST, /* channel: the link that the host asked for is made, or status says why not */
+    PDCP_EVENT_RESET,        /* place: the reset that was asked for has ended with status */
+    PDCP_EVENT_FOREIGN,      /* another arbitrator is heard; this one stays (D-BUS-12) */
+    PDCP_EVENT_SILENT,       /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
+    PDCP_EVENT_STARTED,      /* and has started afresh */
+    PDCP_EVENT_STATE,        /* the bus has another state; status holds it (pdcp_bus_state_t) */
+    PDCP_EVENT_AUDIT,  /* channel: a parameter differs from the tables; status holds its id (D-BUS-40) */
+    PDCP_EVENT_REQUEST /* place: the host's request has ended with status; len bytes of value */
 } pdcp_event_kind_t;
 
 typedef struct {
     pdcp_event_kind_t kind;
-    uint8_t node;
+    uint8_t place;
     uint8_t channel;
     int8_t status; /* pdcp_status_t */
     uint16_t len;
@@ -57,7 +57,7 @@ typedef struct {
     void *event_ctx;
     pdcp_link_t link;
     pdcp_audit_t audit;
-    pdcp_nodes_t nodes;
+    pdcp_tables_t tables;
     pdcp_timers_t timers;
     pdcp_txq_t txq;
     uint32_t stats[PDCP_STAT_COUNT];
@@ -67,7 +67,7 @@ typedef struct {
 } pdcp_bus_t;
 
 /* The device at this place, which must be one. */
-pdcp_node_t *pdcp_bus_node(pdcp_bus_t *bus, uint8_t node);
+pdcp_device_entry_t *pdcp_bus_device(pdcp_bus_t *bus, uint8_t place);
 
 /* Time since the start, PDCP_AGE_MAX_MS at most. */
 uint32_t pdcp_bus_age_ms(const pdcp_bus_t *bus);
@@ -86,10 +86,10 @@ bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdc
 bool pdcp_bus_send_word(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, uint8_t code, uint16_t word);
 
 /* Tells of a device (PDCP_NONE: of none), or of a channel: an input and its link. */
-void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node, pdcp_status_t status);
+void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place, pdcp_status_t status);
 void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status);
 
 /* The same of a device, when there is no more to say. */
-void pdcp_bus_tell_node(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t node);
+void pdcp_bus_tell_device(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place);
 
 #endif

@@ -51,6 +51,6 @@ void pdcp_ends_silence_again(pdcp_bus_t *bus, uint8_t number);
 void pdcp_ends_on_disabled(pdcp_bus_t *bus, pdcp_channel_t *channel);
 
 /* Answers Update Data Channel of a device for its channel index. */
-void pdcp_ends_answer_update(pdcp_bus_t *bus, uint8_t node, uint8_t index, bool connected);
+void pdcp_ends_answer_update(pdcp_bus_t *bus, uint8_t place, uint8_t index, bool connected);
 
 #endif

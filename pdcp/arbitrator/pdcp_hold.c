@@ -6,8 +6,8 @@
 /* Has it granted an id to a device (D-BUS-42)? One that is lost counts (D-BUS-50). */
 bool pdcp_hold_has_own(const pdcp_arb_t *arb)
 {
-    return pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_FREE) +
-               pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_ASKED) !=
+    return pdcp_tables_count_state(&arb->bus.tables, PDCP_PLACE_FREE) +
+               pdcp_tables_count_state(&arb->bus.tables, PDCP_PLACE_ASKED) !=
            PDCP_DEVICES_MAX;
 }
 
@@ -30,24 +30,25 @@ static uint16_t hold_ms(const pdcp_arb_t *arb)
 /* Place of the identity whose request is held; PDCP_NONE: it is not. */
 uint8_t pdcp_hold_place(const pdcp_arb_t *arb, const pdcp_identity_t *identity)
 {
-    const uint8_t place = pdcp_nodes_find(&arb->bus.nodes, identity);
-    return place != PDCP_NONE && arb->bus.nodes.nodes[place].state == PDCP_NODE_ASKED ? place
-                                                                                      : (uint8_t)PDCP_NONE;
+    const uint8_t place = pdcp_tables_find(&arb->bus.tables, identity);
+    return place != PDCP_NONE && arb->bus.tables.devices[place].state == PDCP_PLACE_ASKED
+               ? place
+               : (uint8_t)PDCP_NONE;
 }
 
 void pdcp_hold_drop(pdcp_arb_t *arb, uint8_t place)
 {
     pdcp_timers_cancel(&arb->bus.timers, (uint8_t)(PDCP_TIMER_LIFE + place));
-    pdcp_nodes_remove(&arb->bus.nodes, place);
+    pdcp_tables_remove(&arb->bus.tables, place);
 }
 
 static void bind(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
 {
-    uint8_t node;
-    const pdcp_bind_result_t result = pdcp_bind_on_request(&arb->bus, identity, asked, &node);
-    pdcp_life_after_bind(arb, node, result);
-    if (node != PDCP_NONE) {
-        pdcp_life_serve(arb, node);
+    uint8_t place;
+    const pdcp_bind_result_t result = pdcp_bind_on_request(&arb->bus, identity, asked, &place);
+    pdcp_life_after_bind(arb, place, result);
+    if (place != PDCP_NONE) {
+        pdcp_life_serve(arb, place);
     }
 }
 
@@ -55,12 +56,12 @@ static void bind(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked
  * again. */
 static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked)
 {
-    const uint8_t place = pdcp_nodes_free_place(&arb->bus.nodes);
+    const uint8_t place = pdcp_tables_free_place(&arb->bus.tables);
     if (place == PDCP_NONE) {
         pdcp_bus_count(&arb->bus, PDCP_STAT_NO_ROOM);
         return;
     }
-    pdcp_nodes_hold(&arb->bus.nodes, place, identity);
+    pdcp_tables_hold(&arb->bus.tables, place, identity);
     pdcp_arb_device(arb, place)->asked_id = asked;
     pdcp_life_set(arb, place, hold_ms(arb));
 }
@@ -69,15 +70,15 @@ static void hold(pdcp_arb_t *arb, const pdcp_identity_t *identity, uint8_t asked
  * others follow one by one: they would only wait for each other (D-BUS-49). */
 void pdcp_hold_on_deadline(pdcp_arb_t *arb, uint8_t place)
 {
-    const pdcp_node_t held = *pdcp_arb_device(arb, place);
+    const pdcp_device_entry_t held = *pdcp_arb_device(arb, place);
     arb->held_ms = own_hold_ms(arb);
     pdcp_hold_drop(arb, place);
     bind(arb, &held.identity, held.asked_id);
-    if (pdcp_nodes_count_state(&arb->bus.nodes, PDCP_NODE_SETUP) < PDCP_HOLD_SETUPS) {
+    if (pdcp_tables_count_state(&arb->bus.tables, PDCP_PLACE_SETUP) < PDCP_HOLD_SETUPS) {
         return;
     }
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (pdcp_arb_device(arb, i)->state == PDCP_NODE_ASKED) {
+        if (pdcp_arb_device(arb, i)->state == PDCP_PLACE_ASKED) {
             pdcp_life_set(arb, i, PDCP_HOLD_PACE_MS);
         }
     }

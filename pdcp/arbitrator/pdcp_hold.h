@@ -12,7 +12,7 @@
 /* A frame of priority 3 from a device. */
 void pdcp_hold_on_frame(pdcp_arb_t *arb, const can_frame_t *frame);
 
-/* PDCP_TIMER_LIFE of a place in state PDCP_NODE_ASKED is due. */
+/* PDCP_TIMER_LIFE of a place in state PDCP_PLACE_ASKED is due. */
 void pdcp_hold_on_deadline(pdcp_arb_t *arb, uint8_t place);
 
 /* Has this arbitrator granted an id to a device (D-BUS-42)? */

@@ -9,10 +9,10 @@
 
 /* --- Beginning and end --- */
 
-pdcp_status_t pdcp_host_ask(pdcp_bus_t *bus, pdcp_host_request_t *host, uint8_t node, uint8_t channel,
+pdcp_status_t pdcp_host_ask(pdcp_bus_t *bus, pdcp_host_request_t *host, uint8_t place, uint8_t channel,
                             uint8_t param, uint8_t *bytes, uint16_t size, uint8_t code)
 {
-    if (!pdcp_nodes_is_bound(&bus->nodes, node)) {
+    if (!pdcp_tables_is_bound(&bus->tables, place)) {
         return PDCP_ERR_UNKNOWN;
     }
     if (host->active) {
@@ -22,7 +22,7 @@ pdcp_status_t pdcp_host_ask(pdcp_bus_t *bus, pdcp_host_request_t *host, uint8_t 
     host->waiting = true;
     host->client = PDCP_CLIENT_HOST;
     host->code = code;
-    host->node = node;
+    host->place = place;
     host->channel = channel;
     host->param = param;
     host->bytes = bytes;
@@ -35,7 +35,7 @@ void pdcp_host_start(pdcp_bus_t *bus, pdcp_host_request_t *host)
 {
     host->waiting = false;
     pdcp_timers_cancel(&bus->timers, PDCP_TIMER_HOST);
-    pdcp_request_start(bus, host->node, (pdcp_client_t)host->client, host->code, host->channel, host->param,
+    pdcp_request_start(bus, host->place, (pdcp_client_t)host->client, host->code, host->channel, host->param,
                        host->bytes, host->size);
 }
 
@@ -47,7 +47,7 @@ void pdcp_host_end(pdcp_bus_t *bus, pdcp_host_request_t *host, pdcp_status_t sta
     host->active = false;
     host->waiting = false;
     const pdcp_event_t event = {.kind = PDCP_EVENT_REQUEST,
-                                .node = host->node,
+                                .place = host->place,
                                 .channel = PDCP_NONE,
                                 .status = (int8_t)status,
                                 .len = host->len};
@@ -58,10 +58,10 @@ uint8_t pdcp_host_give_up(pdcp_bus_t *bus, pdcp_host_request_t *host)
 {
     uint8_t freed = PDCP_NONE;
     if (!host->active) {
-        return pdcp_link_give_up_wish(bus);
+        return pdcp_link_give_up_request(bus);
     }
     if (!host->waiting) {
-        freed = host->node;
+        freed = host->place;
         pdcp_request_cancel(bus, freed);
     }
     pdcp_host_end(bus, host, PDCP_ERR_NO_ANSWER);
@@ -80,13 +80,13 @@ static pdcp_host_outcome_t take_written(pdcp_bus_t *bus, const pdcp_host_request
     const uint8_t *value = &host->bytes[head];
     const uint16_t len = (uint16_t)(host->size - head);
     if (host->channel == 0) {
-        pdcp_setup_take_time(pdcp_bus_node(bus, host->node), host->param,
+        pdcp_setup_take_time(pdcp_bus_device(bus, host->place), host->param,
                              pdcp_bytes_value_u16(value, len, 0));
         return PDCP_HOST_TIMES;
     }
-    const uint8_t channel = pdcp_nodes_channel(&bus->nodes, host->node, host->channel);
+    const uint8_t channel = pdcp_tables_channel(&bus->tables, host->place, host->channel);
     if (host->param == PDCP_CH_ENABLED && channel != PDCP_NONE && len != 0) {
-        bus->nodes.channels[channel].enabled = value[0] != 0;
+        bus->tables.channels[channel].enabled = value[0] != 0;
     }
     return PDCP_HOST_NOTHING;
 }
@@ -107,7 +107,7 @@ static pdcp_host_outcome_t follow(pdcp_bus_t *bus, const pdcp_host_request_t *ho
     if (host->code == PDCP_SUSPEND || host->code == PDCP_RELEASE) {
         const uint16_t time_ms =
             host->client == PDCP_CLIENT_RAW ? pdcp_bytes_value_u16(host->bytes, host->size, 1) : host->size;
-        pdcp_suspend_on_host(bus, host->node, host->code, time_ms);
+        pdcp_suspend_on_host(bus, host->place, host->code, time_ms);
     }
     return PDCP_HOST_NOTHING;
 }
@@ -136,7 +136,7 @@ pdcp_host_outcome_t pdcp_host_on_reply(pdcp_bus_t *bus, pdcp_host_request_t *hos
     }
     pdcp_host_end(bus, host, (pdcp_status_t)reply->status);
     if (success && host->code == PDCP_RESET) {
-        pdcp_bus_tell_node(bus, PDCP_EVENT_RESET, host->node);
+        pdcp_bus_tell_device(bus, PDCP_EVENT_RESET, host->place);
         return PDCP_HOST_RESET;
     }
     return outcome;
@@ -146,7 +146,7 @@ pdcp_host_outcome_t pdcp_host_on_reply(pdcp_bus_t *bus, pdcp_host_request_t *hos
 
 void pdcp_host_limit_wait(pdcp_bus_t *bus, const pdcp_host_request_t *host)
 {
-    const bool waits = host->waiting || bus->link.wish_input != PDCP_NONE;
+    const bool waits = host->waiting || bus->link.requested_input != PDCP_NONE;
     const bool limited = pdcp_timers_is_set(&bus->timers, PDCP_TIMER_HOST);
     if (waits && !limited) {
         pdcp_bus_wake(bus, PDCP_TIMER_HOST, PDCP_HOST_WAIT_MS);
@@ -160,5 +160,5 @@ void pdcp_host_on_deadline(pdcp_bus_t *bus, pdcp_host_request_t *host)
     if (host->waiting) {
         pdcp_host_end(bus, host, PDCP_ERR_BUSY);
     }
-    pdcp_link_forget_wish(bus, PDCP_ERR_BUSY);
+    pdcp_link_forget_request(bus, PDCP_ERR_BUSY);
 }

@@ -15,7 +15,7 @@ typedef struct {
     uint8_t client; /* PDCP_CLIENT_HOST; PDCP_CLIENT_RAW: a frame as the host made it, bytes holds its data, 8
                        bytes of room, size is its DLC */
     uint8_t code; /* PDCP_GET_PARAMETER, PDCP_SET_PARAMETER, PDCP_SUSPEND, PDCP_RELEASE; raw: any request's */
-    uint8_t node;
+    uint8_t place;
     uint8_t channel;
     uint8_t param;
     uint8_t *bytes; /* the application's, size bytes of room or of value */
@@ -32,7 +32,7 @@ typedef enum {
 
 /* Begins a request of PDCP_CLIENT_HOST; it waits until pdcp_host_start. PDCP_ERR_UNKNOWN: no such device.
  * PDCP_ERR_BUSY: another one is under way. */
-pdcp_status_t pdcp_host_ask(pdcp_bus_t *bus, pdcp_host_request_t *host, uint8_t node, uint8_t channel,
+pdcp_status_t pdcp_host_ask(pdcp_bus_t *bus, pdcp_host_request_t *host, uint8_t place, uint8_t channel,
                             uint8_t param, uint8_t *bytes, uint16_t size, uint8_t code);
 
 /* The device's place is free: sends the request that waits. */

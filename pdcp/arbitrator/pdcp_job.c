@@ -17,7 +17,7 @@ static void take_old(pdcp_job_t *job, const pdcp_channel_t *input)
 static void give_back_old(const pdcp_job_t *job, pdcp_channel_t *input)
 {
     input->source = job->old;
-    input->source.feed = PDCP_NONE;
+    input->source.channel = PDCP_NONE;
     input->link = job->old_link != PDCP_LINK_NONE ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE; /* D-BUS-10 */
 }
 
@@ -25,12 +25,12 @@ static void give_back_old(const pdcp_job_t *job, pdcp_channel_t *input)
 static void name_source(pdcp_bus_t *bus, pdcp_channel_t *input)
 {
     pdcp_job_t *job = &bus->link.job;
-    const pdcp_channel_t *output = &bus->nodes.channels[job->output];
-    input->source = (pdcp_source_t){.identity = pdcp_bus_node(bus, output->node)->identity,
+    const pdcp_channel_t *output = &bus->tables.channels[job->output];
+    input->source = (pdcp_source_t){.identity = pdcp_bus_device(bus, output->place)->identity,
                                     .type = output->type,
                                     .profile = output->profile,
                                     .index = output->index,
-                                    .feed = job->output};
+                                    .channel = job->output};
     input->link = PDCP_LINK_INACTIVE;
     /* Enabled alone means only: may be. */
     job->output_was_on = pdcp_ends_listener(bus, job->output) != PDCP_NONE;
@@ -73,9 +73,9 @@ void pdcp_job_begin(pdcp_bus_t *bus, pdcp_todo_t kind, uint8_t input, uint8_t ou
 
 void pdcp_job_begin_write(pdcp_bus_t *bus, uint8_t input, bool for_device)
 {
-    const pdcp_channel_t *channel = &bus->nodes.channels[input];
+    const pdcp_channel_t *channel = &bus->tables.channels[input];
     const bool is_active = channel->link == PDCP_LINK_ACTIVE;
-    pdcp_job_begin(bus, PDCP_TODO_WRITE, input, is_active ? channel->source.feed : (uint8_t)PDCP_NONE);
+    pdcp_job_begin(bus, PDCP_TODO_WRITE, input, is_active ? channel->source.channel : (uint8_t)PDCP_NONE);
     if (for_device) {
         bus->link.job.for_device = true;
         bus->link.job.step = PDCP_STEP_READ_VID_PID;
@@ -95,13 +95,13 @@ static void settle_failed(pdcp_bus_t *bus, pdcp_channel_t *input)
     } else {
         pdcp_ends_silence_again(bus, job->output);
     }
-    if (job->old.feed != job->output) {
-        pdcp_ends_release(bus, job->old.feed);
+    if (job->old.channel != job->output) {
+        pdcp_ends_release(bus, job->old.channel);
     }
     if (input == NULL) {
         return;
     }
-    input->source.feed = input->link != PDCP_LINK_NONE ? pdcp_ends_source(bus, input) : PDCP_NONE;
+    input->source.channel = input->link != PDCP_LINK_NONE ? pdcp_ends_source(bus, input) : PDCP_NONE;
     if (job->old_link == PDCP_LINK_ACTIVE) {
         pdcp_ends_note(bus, job->input, PDCP_TODO_CONNECT);
     } else if (input->link == PDCP_LINK_INACTIVE && job->status == PDCP_ERR_NO_ANSWER && !bus->link.planned) {
@@ -115,7 +115,7 @@ static void settle_made(pdcp_bus_t *bus, pdcp_channel_t *input)
     input->link = PDCP_LINK_ACTIVE;
     /* What was noted while it was being made. */
     pdcp_ends_drop(input, PDCP_TODO_CONNECT | PDCP_TODO_WRITE | PDCP_ENDS_SILENCES);
-    pdcp_ends_release(bus, bus->link.job.old.feed); /* unless it is the same: that one is needed */
+    pdcp_ends_release(bus, bus->link.job.old.channel); /* unless it is the same: that one is needed */
 }
 
 static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
@@ -127,8 +127,8 @@ static void settle_silenced(pdcp_bus_t *bus, pdcp_channel_t *input)
     }
     if (input != NULL && job->kind == PDCP_TODO_REMOVE) {
         input->link = PDCP_LINK_NONE;
-        input->source.feed = PDCP_NONE;
-        pdcp_ends_release(bus, job->old.feed);
+        input->source.channel = PDCP_NONE;
+        pdcp_ends_release(bus, job->old.channel);
     }
 }
 
@@ -155,7 +155,7 @@ static void tell_outcome(pdcp_bus_t *bus)
         pdcp_bus_tell_link(bus, PDCP_EVENT_LINK, job->input, status);
     }
     if (job->for_host) {
-        pdcp_bus_tell_link(bus, PDCP_EVENT_WISH, job->input, status);
+        pdcp_bus_tell_link(bus, PDCP_EVENT_LINK_REQUEST, job->input, status);
     }
 }
 
@@ -167,7 +167,7 @@ static void end(pdcp_bus_t *bus)
     settle(bus, input);
     if (job->for_device && input != NULL && /* a device that was not read asks again */
         (job->status != PDCP_ERR_NO_ANSWER || !pdcp_step_is_reading(job->step))) {
-        pdcp_ends_answer_update(bus, input->node, input->index, input->link == PDCP_LINK_ACTIVE);
+        pdcp_ends_answer_update(bus, input->place, input->index, input->link == PDCP_LINK_ACTIVE);
     }
     if (job->kind != PDCP_TODO_WRITE) {
         tell_outcome(bus);
@@ -231,7 +231,7 @@ void pdcp_job_run(pdcp_bus_t *bus)
             return;
         }
         if (result == PDCP_STEP_SENT) {
-            job->at = pdcp_step_channel(bus)->node;
+            job->at = pdcp_step_channel(bus)->place;
         } else if (result == PDCP_STEP_NOTHING || job->undoing || job->kind == PDCP_TODO_WRITE) {
             advance(bus);
         } else {
@@ -248,11 +248,11 @@ static void resolve(pdcp_bus_t *bus)
     pdcp_job_t *job = &bus->link.job;
     pdcp_channel_t *input = pdcp_ends_channel(bus, job->input);
     job->output = pdcp_ends_source(bus, input);
-    if (input->link == PDCP_LINK_ACTIVE && job->output == input->source.feed) {
+    if (input->link == PDCP_LINK_ACTIVE && job->output == input->source.channel) {
         end(bus);
         return;
     }
-    input->link = pdcp_nodes_is_named(input->source.index) ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE;
+    input->link = pdcp_tables_is_named(input->source.index) ? PDCP_LINK_INACTIVE : PDCP_LINK_NONE;
     take_old(job, input);
     if (job->output == PDCP_NONE) {
         if (input->enabled) {
@@ -368,27 +368,27 @@ void pdcp_job_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 
 /* --- Interruptions --- */
 
-void pdcp_job_on_lost(pdcp_bus_t *bus, uint8_t node)
+void pdcp_job_on_lost(pdcp_bus_t *bus, uint8_t place)
 {
     pdcp_job_t *job = &bus->link.job;
     if (!job->active) {
         return;
     }
-    if (pdcp_ends_place(bus, job->input) == node) {
+    if (pdcp_ends_place(bus, job->input) == place) {
         if (!job->undoing && job->kind != PDCP_TODO_WRITE) {
-            give_back_old(job, &bus->nodes.channels[job->input]);
+            give_back_old(job, &bus->tables.channels[job->input]);
         }
         job->input = PDCP_NONE;
     }
-    if (pdcp_ends_place(bus, job->output) == node) {
+    if (pdcp_ends_place(bus, job->output) == place) {
         job->output = PDCP_NONE;
     }
-    if (job->at == node) {
+    if (job->at == place) {
         job->at = PDCP_NONE;
     }
 }
 
-uint8_t pdcp_job_give_up_wish(pdcp_bus_t *bus)
+uint8_t pdcp_job_give_up_request(pdcp_bus_t *bus)
 {
     pdcp_job_t *job = &bus->link.job;
     const uint8_t at = job->at;
@@ -396,7 +396,7 @@ uint8_t pdcp_job_give_up_wish(pdcp_bus_t *bus)
         return PDCP_NONE;
     }
     job->for_host = false;
-    pdcp_bus_tell_link(bus, PDCP_EVENT_WISH, job->input, PDCP_ERR_NO_ANSWER);
+    pdcp_bus_tell_link(bus, PDCP_EVENT_LINK_REQUEST, job->input, PDCP_ERR_NO_ANSWER);
     if (job->undoing) {
         return PDCP_NONE;
     }
@@ -413,7 +413,7 @@ void pdcp_job_break_off(pdcp_bus_t *bus)
 {
     pdcp_job_t *job = &bus->link.job;
     if (job->at != PDCP_NONE) {
-        const pdcp_node_t *device = pdcp_bus_node(bus, job->at);
+        const pdcp_device_entry_t *device = pdcp_bus_device(bus, job->at);
         if (device->asked_again || device->reset_asked) {
             return;
         }

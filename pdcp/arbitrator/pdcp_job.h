@@ -13,7 +13,7 @@
  * A link that cannot be made is undone from the step that failed (D-BUS-21); the input has its old source
  * back at once. A step that has nothing to write, or whose channel is gone, is left out. pdcp_link begins
  * jobs, one at a time, and drives them; what comes of one is noted at the channels (pdcp_ends) and told as
- * PDCP_EVENT_LINK and, if the host waits for it, PDCP_EVENT_WISH. */
+ * PDCP_EVENT_LINK and, if the host waits for it, PDCP_EVENT_LINK_REQUEST. */
 #ifndef PDCP_JOB_H
 #define PDCP_JOB_H
 
@@ -38,11 +38,11 @@ void pdcp_job_run(pdcp_bus_t *bus);
 void pdcp_job_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply);
 
 /* The job goes on without the channels of a device that is gone; its request must be cancelled already. */
-void pdcp_job_on_lost(pdcp_bus_t *bus, uint8_t node);
+void pdcp_job_on_lost(pdcp_bus_t *bus, uint8_t place);
 
 /* The host waits no longer: a job of it tells PDCP_ERR_NO_ANSWER and is undone. Returns the place of the
  * device whose request was broken off, PDCP_NONE: of none. */
-uint8_t pdcp_job_give_up_wish(pdcp_bus_t *bus);
+uint8_t pdcp_job_give_up_request(pdcp_bus_t *bus);
 
 /* Breaks a job of PDCP_TODO_AGAIN off and notes it anew, since everybody else comes first (D-BUS-22). It goes
  * on instead while somebody waits for the place of the device that is asked. */

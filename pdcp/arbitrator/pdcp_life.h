@@ -13,42 +13,42 @@
 #include "pdcp_request.h"
 
 /* Sets a device's deadline: it is lost, forgotten, or its held bind request is answered then. */
-void pdcp_life_set(pdcp_arb_t *arb, uint8_t node, uint16_t in_ms);
+void pdcp_life_set(pdcp_arb_t *arb, uint8_t place, uint16_t in_ms);
 
 /* The beacon interval of a device may have become shorter: the deadline moves by itself only when it
  * fires. */
-void pdcp_life_expect(pdcp_arb_t *arb, uint8_t node);
+void pdcp_life_expect(pdcp_arb_t *arb, uint8_t place);
 
 /* A bind request of a device was answered. If it was granted, the setup begins afresh. */
-void pdcp_life_after_bind(pdcp_arb_t *arb, uint8_t node, pdcp_bind_result_t result);
+void pdcp_life_after_bind(pdcp_arb_t *arb, uint8_t place, pdcp_bind_result_t result);
 
 /* A device's place may have become free for its next request: the check of its identity comes first, then the
  * host, then its reset and its setup. */
-void pdcp_life_serve(pdcp_arb_t *arb, uint8_t node);
+void pdcp_life_serve(pdcp_arb_t *arb, uint8_t place);
 
 /* The device is gone; its ids are kept for it for a while (PDCP_LOST_KEPT_MS). */
-void pdcp_life_lose(pdcp_arb_t *arb, uint8_t node);
+void pdcp_life_lose(pdcp_arb_t *arb, uint8_t place);
 
 /* Tells the device with this id to reset, at most once a second (D-BUS-15, D-BUS-37). It will then bind. */
 void pdcp_life_reset_unknown(pdcp_arb_t *arb, uint8_t id);
 
 /* The reset that was asked for ends, if one was (PDCP_EVENT_RESET). */
-void pdcp_life_end_reset(pdcp_arb_t *arb, uint8_t node, pdcp_status_t status);
+void pdcp_life_end_reset(pdcp_arb_t *arb, uint8_t place, pdcp_status_t status);
 
 /* A beacon of a device that does not count for the host yet, or is lost. */
-void pdcp_life_on_first_beacon(pdcp_arb_t *arb, pdcp_node_t *device);
+void pdcp_life_on_first_beacon(pdcp_arb_t *arb, pdcp_device_entry_t *device);
 
 /* A reply to a request, for whoever asked. Any reply ends the check of an identity. */
-void pdcp_life_on_reply(pdcp_arb_t *arb, uint8_t node, const pdcp_reply_t *reply);
+void pdcp_life_on_reply(pdcp_arb_t *arb, uint8_t place, const pdcp_reply_t *reply);
 
 /* A frame came from a bound id whose identity asks again, and was no answer to the request under way:
  * whatever it says, its owner is alive (D-BUS-41). */
-void pdcp_life_end_check(pdcp_arb_t *arb, uint8_t node);
+void pdcp_life_end_check(pdcp_arb_t *arb, uint8_t place);
 
 /* PDCP_TIMER_REQUEST of this device is due. */
-void pdcp_life_on_request_deadline(pdcp_arb_t *arb, uint8_t node);
+void pdcp_life_on_request_deadline(pdcp_arb_t *arb, uint8_t place);
 
 /* PDCP_TIMER_LIFE of this device is due; no bind request of it is held. */
-void pdcp_life_on_deadline(pdcp_arb_t *arb, uint8_t node);
+void pdcp_life_on_deadline(pdcp_arb_t *arb, uint8_t place);
 
 #endif

@@ -1,6 +1,6 @@
 /* State of the arbitrator's parts: each struct belongs to one part, whose file alone writes it.
  *
- * The structs stand here, below the parts, because pdcp_bus.h keeps one of each and pdcp_nodes.h a request
+ * The structs stand here, below the parts, because pdcp_bus.h keeps one of each and pdcp_tables.h a request
  * for each device: so no header includes one of a part that stands above it. What the parts do with their
  * state say their own headers; exceptions to "alone" are named below.
  *
@@ -11,8 +11,8 @@
  *                                    pdcp_job sets changed, pdcp_audit clears it
  *   pdcp_job_t        pdcp_job       pdcp_link says when it is for the host
  *   pdcp_audit_t      pdcp_audit
- *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is forgotten
- */
+ *   pdcp_suspend_t    pdcp_suspend   pdcp_arb clears it when the bus is
+ * forgotten */
 #ifndef PDCP_PARTS_H
 #define PDCP_PARTS_H
 
@@ -37,7 +37,7 @@ typedef enum {
     PDCP_ERR_DIFFERS = -8  /* the device does not keep what it is told (D-BUS-40) */
 } pdcp_status_t;
 
-/* --- Requests (pdcp_request.h): one for each device, in pdcp_node_t --- */
+/* --- Requests (pdcp_request.h): one for each device, in pdcp_device_entry_t --- */
 
 /* Who asks a device. */
 typedef enum {
@@ -111,8 +111,8 @@ typedef struct {
     pdcp_identity_t identity; /* of the output's device */
     uint16_t type;
     uint16_t profile;
-    uint8_t index; /* channel index; PDCP_NO_SOURCE_INDEX: the input is unconnected */
-    uint8_t feed;  /* channel number; PDCP_NONE: the output is not on the bus */
+    uint8_t index;   /* channel index; PDCP_NO_SOURCE_INDEX: the input is unconnected */
+    uint8_t channel; /* channel number; PDCP_NONE: the output is not on the bus */
 } pdcp_source_t;
 
 /* The job under way, or the last one: what it was about stays readable until the next one begins. */
@@ -141,10 +141,10 @@ typedef struct {
     bool closed;  /* the arbitrator has just started: no output is enabled (D-BUS-36) */
     bool due;     /* some channel has something to do */
     bool changed; /* a link changes, or is about to: whoever wants to know sets this to false before */
-    /* The link that the host or the planner has asked for; wish_input PDCP_NONE: none. */
-    uint8_t wish_input;
-    uint8_t wish_output;
-    bool wish_sole; /* not if another input keeps it from the output */
+    /* The link that the host or the planner has asked for; requested_input PDCP_NONE: none. */
+    uint8_t requested_input;
+    uint8_t requested_output;
+    bool requested_sole; /* not if another input keeps it from the output */
     pdcp_job_t job;
 } pdcp_link_t;
 

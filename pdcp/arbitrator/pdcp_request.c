@@ -4,9 +4,9 @@
 
 #include "pdcp_bytes.h"
 
-bool pdcp_request_is_idle(pdcp_bus_t *bus, uint8_t node)
+bool pdcp_request_is_idle(pdcp_bus_t *bus, uint8_t place)
 {
-    return pdcp_bus_node(bus, node)->request.state == PDCP_REQUEST_IDLE;
+    return pdcp_bus_device(bus, place)->request.state == PDCP_REQUEST_IDLE;
 }
 
 static bool is_parameter(const pdcp_request_t *request)
@@ -32,7 +32,7 @@ static uint8_t packet_len(const pdcp_request_t *request)
     return (uint8_t)(left < PDCP_BULK_PACKET_MAX ? left : PDCP_BULK_PACKET_MAX);
 }
 
-static void send_raw(pdcp_bus_t *bus, const pdcp_node_t *device)
+static void send_raw(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
     const pdcp_request_t *request = &device->request;
     can_frame_t frame = {.id = pdcp_can_id(PDCP_PRIORITY_NORMAL, true, device->node_id),
@@ -42,7 +42,7 @@ static void send_raw(pdcp_bus_t *bus, const pdcp_node_t *device)
 }
 
 /* The codec takes what belongs to the message. */
-static void send_message(pdcp_bus_t *bus, const pdcp_node_t *device)
+static void send_message(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
     const pdcp_request_t *request = &device->request;
     pdcp_msg_t msg = {.code = code_of(request),
@@ -57,14 +57,14 @@ static void send_message(pdcp_bus_t *bus, const pdcp_node_t *device)
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, device->node_id, &msg);
 }
 
-static void wait_for_answer(pdcp_bus_t *bus, const pdcp_node_t *device)
+static void wait_for_answer(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
     pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + device->place), device->ack_ms);
 }
 
 /* Sends what the state asks for and waits for its answer. A frame that finds no room is repeated at the
  * deadline, like one that got lost on the way. */
-static void send(pdcp_bus_t *bus, const pdcp_node_t *device)
+static void send(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
     if (device->request.state == PDCP_REQUEST_RAW) {
         send_raw(bus, device);
@@ -74,7 +74,7 @@ static void send(pdcp_bus_t *bus, const pdcp_node_t *device)
     wait_for_answer(bus, device);
 }
 
-static void enter(pdcp_bus_t *bus, pdcp_node_t *device, pdcp_request_state_t state)
+static void enter(pdcp_bus_t *bus, pdcp_device_entry_t *device, pdcp_request_state_t state)
 {
     device->request.state = (uint8_t)state;
     device->request.tries_left = PDCP_TRIES - 1;
@@ -82,7 +82,7 @@ static void enter(pdcp_bus_t *bus, pdcp_node_t *device, pdcp_request_state_t sta
 }
 
 /* From its beginning, also once more. */
-static void start_bulk(pdcp_bus_t *bus, pdcp_node_t *device)
+static void start_bulk(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->request.offset = 0;
     device->request.packet_id = 0;
@@ -90,10 +90,10 @@ static void start_bulk(pdcp_bus_t *bus, pdcp_node_t *device)
           device->request.code == PDCP_GET_PARAMETER ? PDCP_REQUEST_GET_SIZE : PDCP_REQUEST_SET_SIZE);
 }
 
-void pdcp_request_start(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uint8_t code, uint8_t channel,
+void pdcp_request_start(pdcp_bus_t *bus, uint8_t place, pdcp_client_t client, uint8_t code, uint8_t channel,
                         uint8_t param, const uint8_t *bytes, uint16_t size)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     pdcp_request_t *request = &device->request;
     memset(request, 0, sizeof *request);
     request->bytes = bytes;
@@ -120,15 +120,15 @@ void pdcp_request_start(pdcp_bus_t *bus, uint8_t node, pdcp_client_t client, uin
     enter(bus, device, PDCP_REQUEST_ANSWER);
 }
 
-void pdcp_request_limit_tries(pdcp_bus_t *bus, uint8_t node, uint8_t tries)
+void pdcp_request_limit_tries(pdcp_bus_t *bus, uint8_t place, uint8_t tries)
 {
-    pdcp_bus_node(bus, node)->request.tries_left = (uint8_t)(tries - 1u);
+    pdcp_bus_device(bus, place)->request.tries_left = (uint8_t)(tries - 1u);
 }
 
-void pdcp_request_cancel(pdcp_bus_t *bus, uint8_t node)
+void pdcp_request_cancel(pdcp_bus_t *bus, uint8_t place)
 {
-    pdcp_bus_node(bus, node)->request.state = PDCP_REQUEST_IDLE;
-    pdcp_timers_cancel(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + node));
+    pdcp_bus_device(bus, place)->request.state = PDCP_REQUEST_IDLE;
+    pdcp_timers_cancel(&bus->timers, (uint8_t)(PDCP_TIMER_REQUEST + place));
 }
 
 static void reply_head(const pdcp_request_t *request, pdcp_reply_t *reply, const uint8_t *bytes, uint8_t len)
@@ -143,7 +143,7 @@ static void reply_head(const pdcp_request_t *request, pdcp_reply_t *reply, const
     reply->len = len;
 }
 
-static bool finish(pdcp_bus_t *bus, pdcp_node_t *device, pdcp_status_t status, pdcp_reply_t *reply)
+static bool finish(pdcp_bus_t *bus, pdcp_device_entry_t *device, pdcp_status_t status, pdcp_reply_t *reply)
 {
     reply->done = true;
     reply->status = (int8_t)status;
@@ -152,7 +152,7 @@ static bool finish(pdcp_bus_t *bus, pdcp_node_t *device, pdcp_status_t status, p
     return true;
 }
 
-static bool restart_bulk(pdcp_bus_t *bus, pdcp_node_t *device, pdcp_reply_t *reply)
+static bool restart_bulk(pdcp_bus_t *bus, pdcp_device_entry_t *device, pdcp_reply_t *reply)
 {
     if (device->request.restarts_left == 0) {
         return finish(bus, device, PDCP_ERR_BULK, reply);
@@ -176,7 +176,7 @@ static bool is_packet(const pdcp_request_t *request)
 }
 
 /* What was sent has failed: the device wants a parameter by bulk, or a packet again, or it refuses. */
-static bool on_failure(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t result, pdcp_reply_t *reply)
+static bool on_failure(pdcp_bus_t *bus, pdcp_device_entry_t *device, uint8_t result, pdcp_reply_t *reply)
 {
     const pdcp_request_t *request = &device->request;
     if (is_packet(request)) {
@@ -191,14 +191,15 @@ static bool on_failure(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t result, pdc
 
 /* A packet that was sent more than once may be answered more than once. An answer that came later would be
  * taken for that to the next packet, which may be lost: the next one waits (D-BUS-39, D-BUS-52). */
-static void await_echoes(pdcp_bus_t *bus, pdcp_node_t *device)
+static void await_echoes(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->request.tries_left = (uint8_t)(PDCP_TRIES - 1 - device->request.tries_left);
     device->request.state = PDCP_REQUEST_SET_ECHO;
     wait_for_answer(bus, device);
 }
 
-static bool on_success(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *msg, pdcp_reply_t *reply)
+static bool on_success(pdcp_bus_t *bus, pdcp_device_entry_t *device, const pdcp_msg_t *msg,
+                       pdcp_reply_t *reply)
 {
     pdcp_request_t *request = &device->request;
     pdcp_request_state_t next = PDCP_REQUEST_SET_DATA;
@@ -236,7 +237,7 @@ static bool on_success(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *m
     return false;
 }
 
-static void answer_packet(pdcp_bus_t *bus, const pdcp_node_t *device, uint8_t result)
+static void answer_packet(pdcp_bus_t *bus, const pdcp_device_entry_t *device, uint8_t result)
 {
     const pdcp_msg_t msg = {.code = PDCP_BULK_DATA | PDCP_ANSWER, .result = result};
     (void)pdcp_bus_send(bus, PDCP_PRIORITY_NORMAL, device->node_id, &msg);
@@ -244,7 +245,8 @@ static void answer_packet(pdcp_bus_t *bus, const pdcp_node_t *device, uint8_t re
 
 /* A packet from the device: the next one, the one before once more (its answer got lost, D-BUS-9), or a wrong
  * one. */
-static bool on_packet(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_msg_t *msg, pdcp_reply_t *reply)
+static bool on_packet(pdcp_bus_t *bus, pdcp_device_entry_t *device, const pdcp_msg_t *msg,
+                      pdcp_reply_t *reply)
 {
     pdcp_request_t *request = &device->request;
     const uint16_t left = (uint16_t)(request->size - request->offset);
@@ -295,9 +297,9 @@ static bool tells_of_another_write(const pdcp_request_t *request, const pdcp_msg
            msg->result == PDCP_SUCCESS && memcmp(msg->value, request->value, len) != 0;
 }
 
-bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *msg, pdcp_reply_t *reply)
+bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t place, const pdcp_msg_t *msg, pdcp_reply_t *reply)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     const pdcp_request_t *request = &device->request;
     reply_head(request, reply, msg->value, msg->len);
     if (msg->code == PDCP_BULK_DATA) {
@@ -314,9 +316,9 @@ bool pdcp_request_on_message(pdcp_bus_t *bus, uint8_t node, const pdcp_msg_t *ms
                                        : on_failure(bus, device, msg->result, reply);
 }
 
-bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t node, const can_frame_t *frame, pdcp_reply_t *reply)
+bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t place, const can_frame_t *frame, pdcp_reply_t *reply)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     const pdcp_request_t *request = &device->request;
     if (request->state != PDCP_REQUEST_RAW || frame->dlc == 0 ||
         frame->data[0] != (request->code | PDCP_ANSWER)) {
@@ -331,9 +333,9 @@ bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t node, const can_frame_t *fra
     return finish(bus, device, PDCP_OK, reply);
 }
 
-bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t node, pdcp_reply_t *reply)
+bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t place, pdcp_reply_t *reply)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     pdcp_request_t *request = &device->request;
     reply_head(request, reply, request->value, 0);
     if (request->state == PDCP_REQUEST_IDLE) {

@@ -13,12 +13,12 @@
 void pdcp_role_begin(pdcp_arb_t *arb)
 {
     for (unsigned id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
-        if (arb->bus.nodes.owner[id] != 0) {
+        if (arb->bus.tables.owner[id] != 0) {
             pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, (uint8_t)id);
         }
     }
     arb->bus.bind.shut = pdcp_unknown_any(&arb->bus.unknown);
-    pdcp_nodes_init(&arb->bus.nodes);
+    pdcp_tables_init(&arb->bus.tables);
     for (int i = 0; i < PDCP_TIMER_RECOVERY; i++) { /* a controller that is off leaves that state */
         pdcp_timers_cancel(&arb->bus.timers, (uint8_t)i);
     }
@@ -58,12 +58,12 @@ static void go_silent(pdcp_arb_t *arb)
 {
     arb->silent = true;
     pdcp_host_end(&arb->bus, &arb->host, PDCP_ERR_NO_ANSWER);
-    if (pdcp_link_wish_waits(&arb->bus)) {
-        pdcp_bus_tell(&arb->bus, PDCP_EVENT_WISH, PDCP_NONE, PDCP_ERR_NO_ANSWER);
+    if (pdcp_link_request_waits(&arb->bus)) {
+        pdcp_bus_tell(&arb->bus, PDCP_EVENT_LINK_REQUEST, PDCP_NONE, PDCP_ERR_NO_ANSWER);
     }
     pdcp_role_begin(arb);
     stand_by(arb);
-    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
+    pdcp_bus_tell_device(&arb->bus, PDCP_EVENT_SILENT, PDCP_NONE);
 }
 
 /* The standby is over: the other arbitrator is gone, or serves no longer (D-BUS-42). */
@@ -71,7 +71,7 @@ void pdcp_role_take_over(pdcp_arb_t *arb)
 {
     arb->silent = false;
     pdcp_role_begin(arb);
-    pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
+    pdcp_bus_tell_device(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
 }
 
 /* Without devices of its own an arbitrator goes on standby when another one serves. With some it stays; but
@@ -99,7 +99,7 @@ static void on_foreign_beacon(pdcp_arb_t *arb)
         return;
     }
     if (is_first) {
-        pdcp_bus_tell_node(&arb->bus, PDCP_EVENT_FOREIGN, PDCP_NONE);
+        pdcp_bus_tell_device(&arb->bus, PDCP_EVENT_FOREIGN, PDCP_NONE);
     }
     if (is_to_yield(arb)) {
         go_silent(arb);

@@ -41,12 +41,12 @@ static const step_t output_steps[] = {PDCP_CH_TYPE_PROFILE | MANDATORY, PDCP_CH_
 /* Longest values that a setup has use for: a bit string of 256 channels. */
 #define SETUP_VALUE_MAX 32u
 
-static pdcp_channel_t *current_channel(pdcp_bus_t *bus, const pdcp_node_t *device)
+static pdcp_channel_t *current_channel(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
-    return &bus->nodes.channels[device->setup_channel];
+    return &bus->tables.channels[device->setup_channel];
 }
 
-static step_t current_step(pdcp_bus_t *bus, const pdcp_node_t *device)
+static step_t current_step(pdcp_bus_t *bus, const pdcp_device_entry_t *device)
 {
     static const step_t *const lists[] = {device_steps, silence_steps, direction_steps, input_steps};
     const step_t *steps = lists[device->setup_pass];
@@ -56,25 +56,25 @@ static step_t current_step(pdcp_bus_t *bus, const pdcp_node_t *device)
     return steps[device->setup_step];
 }
 
-static void pause(pdcp_bus_t *bus, const pdcp_node_t *device, uint16_t pause_ms)
+static void pause(pdcp_bus_t *bus, const pdcp_device_entry_t *device, uint16_t pause_ms)
 {
     pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + device->place), pause_ms);
 }
 
 /* The device is left bound but unlinked; reported once, and tried again from time to time. */
-static void give_up(pdcp_bus_t *bus, pdcp_node_t *device)
+static void give_up(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
-    device->state = PDCP_NODE_FAILED;
+    device->state = PDCP_PLACE_FAILED;
     pause(bus, device, PDCP_SETUP_AGAIN_MS);
     if (!device->setup_again) {
         device->setup_again = true;
         pdcp_bus_count(bus, PDCP_STAT_SETUP_FAILED);
-        pdcp_bus_tell_node(bus, PDCP_EVENT_SETUP_FAILED, device->place);
+        pdcp_bus_tell_device(bus, PDCP_EVENT_SETUP_FAILED, device->place);
     }
 }
 
 /* The step has failed: the same again after a pause, so that on a bad line what is done stays done. */
-static void fail(pdcp_bus_t *bus, pdcp_node_t *device)
+static void fail(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->setup_attempts++;
     if (device->setup_attempts < PDCP_SETUP_ATTEMPTS) {
@@ -84,7 +84,7 @@ static void fail(pdcp_bus_t *bus, pdcp_node_t *device)
     }
 }
 
-static void no_room(pdcp_bus_t *bus, pdcp_node_t *device)
+static void no_room(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
     give_up(bus, device);
@@ -92,7 +92,7 @@ static void no_room(pdcp_bus_t *bus, pdcp_node_t *device)
 
 /* Writes of the setup: transfer enabled 0, and the node id of an output, for which it may have to wait
  * (D-BUS-48). */
-static void write_step(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param)
+static void write_step(pdcp_bus_t *bus, pdcp_device_entry_t *device, uint8_t param)
 {
     pdcp_channel_t *channel = current_channel(bus, device);
     uint8_t value = 0;
@@ -110,9 +110,9 @@ static void write_step(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param)
     pdcp_request_set(bus, device->place, PDCP_CLIENT_SETUP, channel->index, param, &value, 1);
 }
 
-void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t node)
+void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t place)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     const step_t step = current_step(bus, device);
     const uint8_t param = (uint8_t)(step & PARAM);
     if ((step & WRITE) != 0) {
@@ -120,13 +120,13 @@ void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t node)
         return;
     }
     const uint8_t index = device->setup_pass == PASS_DEVICE ? 0 : current_channel(bus, device)->index;
-    pdcp_request_get(bus, node, PDCP_CLIENT_SETUP, index, param, SETUP_VALUE_MAX);
+    pdcp_request_get(bus, place, PDCP_CLIENT_SETUP, index, param, SETUP_VALUE_MAX);
 }
 
-void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
+void pdcp_setup_start(pdcp_bus_t *bus, uint8_t place)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
-    device->state = PDCP_NODE_SETUP;
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
+    device->state = PDCP_PLACE_SETUP;
     device->setup_pass = PASS_DEVICE;
     device->setup_step = 0;
     device->setup_channel = PDCP_NONE;
@@ -135,21 +135,21 @@ void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node)
     device->beacon_ms = PDCP_BEACON_MS;
 }
 
-static void enter_next_pass(pdcp_bus_t *bus, pdcp_node_t *device)
+static void enter_next_pass(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->setup_pass++;
     device->setup_channel = device->first_channel;
     if (device->setup_channel == PDCP_NONE || device->setup_pass > PASS_CHANNELS) {
-        device->state = PDCP_NODE_READY;
+        device->state = PDCP_PLACE_READY;
         device->setup_again = false;
-        pdcp_bus_tell_node(bus, PDCP_EVENT_READY, device->place);
-    } else if (device->setup_pass == PASS_CHANNELS && !pdcp_nodes_make_needs(&bus->nodes, device->place)) {
+        pdcp_bus_tell_device(bus, PDCP_EVENT_READY, device->place);
+    } else if (device->setup_pass == PASS_CHANNELS && !pdcp_tables_make_needs(&bus->tables, device->place)) {
         no_room(bus, device);
     }
 }
 
 /* The next step of this channel, the next channel, the next pass. */
-static void go_on(pdcp_bus_t *bus, pdcp_node_t *device)
+static void go_on(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->setup_step++;
     device->setup_attempts = 0;
@@ -173,7 +173,7 @@ static uint16_t clamp(uint16_t value, uint16_t low, uint16_t high)
     return value > high ? high : value;
 }
 
-void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, uint16_t time_ms)
+void pdcp_setup_take_time(pdcp_device_entry_t *device, uint8_t param, uint16_t time_ms)
 {
     if (param == PDCP_DEV_ACK_TIME) {
         device->ack_ms = clamp(time_ms, PDCP_ACK_MIN_MS, PDCP_ACK_MAX_MS);
@@ -192,17 +192,18 @@ static void forget_id(pdcp_bus_t *bus, pdcp_channel_t *channel)
 }
 
 /* The channels of a device with a higher index than this are no more. */
-static void forget_ids_behind(pdcp_bus_t *bus, const pdcp_node_t *device, uint8_t count)
+static void forget_ids_behind(pdcp_bus_t *bus, const pdcp_device_entry_t *device, uint8_t count)
 {
-    for (uint8_t c = device->first_channel; c != PDCP_NONE; c = bus->nodes.channels[c].next) {
-        if (bus->nodes.channels[c].index > count) {
-            forget_id(bus, &bus->nodes.channels[c]);
+    for (uint8_t c = device->first_channel; c != PDCP_NONE; c = bus->tables.channels[c].next) {
+        if (bus->tables.channels[c].index > count) {
+            forget_id(bus, &bus->tables.channels[c]);
         }
     }
 }
 
 /* Takes over a device parameter, a number or two. False: it does not fit, the attempt has failed. */
-static bool take_device(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param, uint16_t low, uint16_t high)
+static bool take_device(pdcp_bus_t *bus, pdcp_device_entry_t *device, uint8_t param, uint16_t low,
+                        uint16_t high)
 {
     switch (param) {
     case PDCP_DEV_VID_PID:
@@ -221,7 +222,7 @@ static bool take_device(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param, uin
         break;
     case PDCP_DEV_CHANNELS:
         forget_ids_behind(bus, device, (uint8_t)(low & 0xFFu));
-        if (!pdcp_nodes_set_channels(&bus->nodes, device->place, (uint8_t)(low & 0xFFu))) {
+        if (!pdcp_tables_set_channels(&bus->tables, device->place, (uint8_t)(low & 0xFFu))) {
             pdcp_bus_count(bus, PDCP_STAT_NO_ROOM);
             return false;
         }
@@ -236,16 +237,16 @@ static bool take_device(pdcp_bus_t *bus, pdcp_node_t *device, uint8_t param, uin
 /* Takes over the direction of a channel, and forgets what was known of it if that has changed. */
 static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
 {
-    pdcp_channel_t *channel = &bus->nodes.channels[number];
+    pdcp_channel_t *channel = &bus->tables.channels[number];
     if (transfer != PDCP_INPUT && transfer != PDCP_OUTPUT) {
         return false;
     }
     if (channel->transfer != 0 && channel->transfer != transfer) {
         forget_id(bus, channel);
-        pdcp_nodes_drop_feed(&bus->nodes, number);
+        pdcp_tables_drop_source(&bus->tables, number);
         channel->link = PDCP_LINK_NONE;
         channel->todo = PDCP_TODO_NONE;
-        channel->source.feed = PDCP_NONE;
+        channel->source.channel = PDCP_NONE;
     }
     channel->transfer = transfer;
     return true;
@@ -255,10 +256,10 @@ static bool take_direction(pdcp_bus_t *bus, uint8_t number, uint8_t transfer)
  * told what it should name (D-BUS-38). */
 static void take_source(pdcp_bus_t *bus, uint8_t number, uint8_t param, uint16_t low, uint16_t high)
 {
-    pdcp_channel_t *input = &bus->nodes.channels[number];
+    pdcp_channel_t *input = &bus->tables.channels[number];
     if (input->link == PDCP_LINK_NONE) {
-        pdcp_nodes_take_source(input, param, low, high);
-    } else if (!pdcp_nodes_is_source(input, param, low, high)) {
+        pdcp_tables_take_source(input, param, low, high);
+    } else if (!pdcp_tables_is_source(input, param, low, high)) {
         pdcp_link_write(bus, number);
     }
 }
@@ -267,7 +268,7 @@ static void take_source(pdcp_bus_t *bus, uint8_t number, uint8_t param, uint16_t
 static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *reply, uint16_t low,
                          uint16_t high)
 {
-    pdcp_channel_t *channel = &bus->nodes.channels[number];
+    pdcp_channel_t *channel = &bus->tables.channels[number];
     switch (reply->param) {
     case PDCP_CH_TYPE_PROFILE:
         channel->type = low;
@@ -295,12 +296,12 @@ static bool take_channel(pdcp_bus_t *bus, uint8_t number, const pdcp_reply_t *re
 }
 
 /* Takes over a value or a piece of one. Bit strings may have many, numbers stand in the first one. */
-static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply)
+static bool take(pdcp_bus_t *bus, pdcp_device_entry_t *device, const pdcp_reply_t *reply)
 {
     if (device->setup_pass != PASS_DEVICE &&
         (reply->param == PDCP_CH_REQUIRED || reply->param == PDCP_CH_DESIRED)) {
-        pdcp_nodes_put_needs(&bus->nodes, device->setup_channel, reply->param == PDCP_CH_DESIRED,
-                             reply->offset, reply->bytes, reply->len);
+        pdcp_tables_put_needs(&bus->tables, device->setup_channel, reply->param == PDCP_CH_DESIRED,
+                              reply->offset, reply->bytes, reply->len);
         return true;
     }
     if (reply->offset != 0) {
@@ -312,9 +313,9 @@ static bool take(pdcp_bus_t *bus, pdcp_node_t *device, const pdcp_reply_t *reply
                                              : take_channel(bus, device->setup_channel, reply, low, high);
 }
 
-pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply)
+pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t place, const pdcp_reply_t *reply)
 {
-    pdcp_node_t *device = pdcp_bus_node(bus, node);
+    pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     bool done_well = false;
     if (reply->status == PDCP_OK) { /* a value, or a piece of one */
         done_well = take(bus, device, reply);
@@ -322,7 +323,7 @@ pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_repl
         done_well = (current_step(bus, device) & MANDATORY) == 0;
     }
     if (!done_well) {
-        pdcp_request_cancel(bus, node);
+        pdcp_request_cancel(bus, place);
         fail(bus, device);
         if (reply->status == PDCP_OK && device->setup_pass == PASS_DEVICE &&
             reply->param <= PDCP_DEV_SERIAL) {

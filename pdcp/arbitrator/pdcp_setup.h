@@ -12,18 +12,18 @@
 
 /* Puts a device at the beginning of its setup, in whatever state it is; its place must have no request under
  * way. */
-void pdcp_setup_start(pdcp_bus_t *bus, uint8_t node);
+void pdcp_setup_start(pdcp_bus_t *bus, uint8_t place);
 
 /* Sends the request of the current step. To be called when the device has no request under way and its
  * requests' timer does not run. */
-void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t node);
+void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t place);
 
 /* Takes over a device's acknowledgement time (parameter 11) or beacon interval (10), as read, or as written
  * by the host (D-BUS-25), within the limits of D-BUS-13. Other parameters: nothing. */
-void pdcp_setup_take_time(pdcp_node_t *device, uint8_t param, uint16_t time_ms);
+void pdcp_setup_take_time(pdcp_device_entry_t *device, uint8_t param, uint16_t time_ms);
 
 /* A reply to a request of PDCP_CLIENT_SETUP. When the step has failed, the timer of the device's requests
  * runs until it is to be tried again. PDCP_ERR_UNKNOWN: the device is another than the bound one. */
-pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t node, const pdcp_reply_t *reply);
+pdcp_status_t pdcp_setup_on_reply(pdcp_bus_t *bus, uint8_t place, const pdcp_reply_t *reply);
 
 #endif

@@ -35,16 +35,16 @@ typedef enum {
     PDCP_STAT_REPEATS,
     PDCP_STAT_NO_ANSWER, /* requests that failed for want of an answer */
     PDCP_STAT_BULK_RESTARTS,
-    PDCP_STAT_SETUP_FAILED,   /* devices left bound but unlinked */
-    PDCP_STAT_NO_ROOM,        /* channels or their needs that found their table full */
-    PDCP_STAT_LOST,           /* devices lost */
-    PDCP_STAT_LINK_FAILED,    /* links that could not be made and were undone */
-    PDCP_STAT_STRANGER_RESET, /* Reset Device sent to an id that is not bound (D-BUS-15) */
-    PDCP_STAT_TAKEN,          /* frames for the arbitrator that it has made use of */
-    PDCP_STAT_DROP_SILENT,    /* everything but foreign beacons while on standby (D-BUS-12) */
-    PDCP_STAT_TX_DISCARDED,   /* frames that waited while the bus was off */
-    PDCP_STAT_BUS_OFF,        /* times that the controller went off the bus */
-    PDCP_STAT_AUDIT,          /* parameters of channels that were not as the tables say (D-BUS-40) */
+    PDCP_STAT_SETUP_FAILED,  /* devices left bound but unlinked */
+    PDCP_STAT_NO_ROOM,       /* channels or their needs that found their table full */
+    PDCP_STAT_LOST,          /* devices lost */
+    PDCP_STAT_LINK_FAILED,   /* links that could not be made and were undone */
+    PDCP_STAT_UNKNOWN_RESET, /* Reset Device sent to an id that is not bound (D-BUS-15) */
+    PDCP_STAT_TAKEN,         /* frames for the arbitrator that it has made use of */
+    PDCP_STAT_DROP_SILENT,   /* everything but foreign beacons while on standby (D-BUS-12) */
+    PDCP_STAT_TX_DISCARDED,  /* frames that waited while the bus was off */
+    PDCP_STAT_BUS_OFF,       /* times that the controller went off the bus */
+    PDCP_STAT_AUDIT,         /* parameters of channels that were not as the tables say (D-BUS-40) */
     PDCP_STAT_COUNT
 } pdcp_stat_t;
 

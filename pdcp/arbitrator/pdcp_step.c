@@ -38,7 +38,7 @@ pdcp_channel_t *pdcp_step_channel(pdcp_bus_t *bus)
 
 static bool has_id(const pdcp_bus_t *bus, uint8_t output)
 {
-    return output != PDCP_NONE && bus->nodes.channels[output].node_id != 0;
+    return output != PDCP_NONE && bus->tables.channels[output].node_id != 0;
 }
 
 /* Is the output there that the current step needs, with a node id or, in the step that gives it one, one to
@@ -115,8 +115,9 @@ static uint8_t put_value(pdcp_bus_t *bus, uint8_t *bytes)
     } else if (is_about_output(job->step)) {
         word = output->node_id;
     } else if (param == PDCP_IN_SOURCE_NODES) {
-        word = job->undoing ? 0
-                            : pdcp_codec_node_ids(pdcp_bus_node(bus, output->node)->node_id, output->node_id);
+        word = job->undoing
+                   ? 0
+                   : pdcp_codec_node_ids(pdcp_bus_device(bus, output->place)->node_id, output->node_id);
         len = 2;
     } else {
         return put_source(pdcp_ends_channel(bus, job->input), param, bytes);
@@ -132,7 +133,7 @@ static void expect_effect(pdcp_bus_t *bus, pdcp_channel_t *channel)
     if (is_enabling(job)) {
         channel->enabled = true;
     } else if (job->step == PDCP_STEP_NODES && !job->undoing) {
-        channel->node_id = bus->nodes.channels[job->output].node_id; /* it may listen to it */
+        channel->node_id = bus->tables.channels[job->output].node_id; /* it may listen to it */
     }
 }
 
@@ -144,7 +145,7 @@ static bool send_request(pdcp_bus_t *bus, pdcp_channel_t *channel)
     const uint8_t param = params[job->step];
     uint8_t bytes[PDCP_VALUE_MAX];
     if (pdcp_step_is_reading(job->step)) {
-        pdcp_request_get(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, PDCP_VALUE_MAX);
+        pdcp_request_get(bus, channel->place, PDCP_CLIENT_LINK, channel->index, param, PDCP_VALUE_MAX);
         return true;
     }
     if ((job->step == PDCP_STEP_OUTPUT_ID && !pdcp_bind_give_output_id(bus, channel)) ||
@@ -153,9 +154,9 @@ static bool send_request(pdcp_bus_t *bus, pdcp_channel_t *channel)
     }
     expect_effect(bus, channel);
     const uint8_t len = put_value(bus, bytes);
-    pdcp_request_set(bus, channel->node, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
+    pdcp_request_set(bus, channel->place, PDCP_CLIENT_LINK, channel->index, param, bytes, len);
     if (job->once) {
-        pdcp_request_limit_tries(bus, channel->node, 1);
+        pdcp_request_limit_tries(bus, channel->place, 1);
     }
     return true;
 }
@@ -177,7 +178,7 @@ pdcp_step_result_t pdcp_step_send(pdcp_bus_t *bus)
     if (job->step == PDCP_STEP_OUTPUT_ID && channel->node_id != 0) {
         return PDCP_STEP_NOTHING;
     }
-    if (!pdcp_request_is_idle(bus, channel->node) || is_too_early(bus)) {
+    if (!pdcp_request_is_idle(bus, channel->place) || is_too_early(bus)) {
         return PDCP_STEP_LATER;
     }
     return send_request(bus, channel) ? PDCP_STEP_SENT : PDCP_STEP_NOTHING;
@@ -191,9 +192,9 @@ bool pdcp_step_take(pdcp_bus_t *bus, const pdcp_reply_t *reply)
         const uint16_t low = pdcp_request_word(reply, 0);
         const uint16_t high = pdcp_request_word(reply, 2);
         if (job->kind != PDCP_TODO_UPDATE) {
-            return pdcp_nodes_is_source(channel, reply->param, low, high);
+            return pdcp_tables_is_source(channel, reply->param, low, high);
         }
-        pdcp_nodes_take_source(channel, reply->param, low, high);
+        pdcp_tables_take_source(channel, reply->param, low, high);
     } else if (job->step == PDCP_STEP_INPUT_OFF || (job->step >= PDCP_STEP_INPUT_ON && job->undoing)) {
         pdcp_ends_on_disabled(bus, channel);
     } else if (job->step == PDCP_STEP_NODES && job->undoing) {

@@ -19,10 +19,10 @@ enum {
 
 /* The host has sent Suspend, for time_ms, 0: until released, or Release; to a device or (PDCP_NONE) to
  * all. */
-void pdcp_suspend_on_host(pdcp_bus_t *bus, uint8_t node, uint8_t code, uint16_t time_ms);
+void pdcp_suspend_on_host(pdcp_bus_t *bus, uint8_t place, uint8_t code, uint16_t time_ms);
 
 /* A device was bound: it is not suspended. */
-void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t node);
+void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t place);
 
 /* Somebody else has sent Suspend to this node id, 0: to all. */
 void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id);
@@ -32,10 +32,10 @@ void pdcp_suspend_on_beacon(pdcp_bus_t *bus);
 
 /* A device is lost, its request not yet cancelled: a Release that was not answered is due again when it is
  * back. */
-void pdcp_suspend_on_lost(pdcp_bus_t *bus, uint8_t node);
+void pdcp_suspend_on_lost(pdcp_bus_t *bus, uint8_t place);
 
 /* A device was told Release. */
-void pdcp_suspend_on_reply(pdcp_bus_t *bus, uint8_t node, pdcp_status_t status);
+void pdcp_suspend_on_reply(pdcp_bus_t *bus, uint8_t place, pdcp_status_t status);
 
 /* PDCP_TIMER_RELEASE is due: devices are told Release as their places are free. */
 void pdcp_suspend_on_deadline(pdcp_bus_t *bus);

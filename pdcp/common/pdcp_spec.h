@@ -116,7 +116,7 @@ enum {
     PDCP_UNBOUND_MS = 1000,      /* over so long, show that the other one serves no longer */
     PDCP_RECOVERY_MS = 100,      /* first pause before leaving bus-off, doubling */
     PDCP_RECOVERY_MAX_MS = 5000,
-    PDCP_YOUNG_MS = 1200,   /* first time of an arbitrator: no Reset to strangers (D-BUS-15) */
+    PDCP_YOUNG_MS = 1200,   /* first time of an arbitrator: no Reset to unknown devices (D-BUS-15) */
     PDCP_CLOSED_MS = 500,   /* first time of an arbitrator: no output is enabled (D-BUS-36) */
     PDCP_SHUT_MS = 11000,   /* and if an unknown id is heard in it: no output id is given (D-BUS-36) */
     PDCP_FADING_MS = 100,   /* a disabled output may send what it has queued (D-BUS-36) */

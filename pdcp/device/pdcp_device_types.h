@@ -33,8 +33,8 @@ typedef struct {
     pdcp_device_bytes_t desired;
 } pdcp_device_channel_desc_t;
 
-/* A parameter of the application's own: a gain, a threshold, a name that can be changed. It is looked up before
- * those of the specification, so that it may take the place of one, such as a writable descriptor. */
+/* A parameter of the application's own: a gain, a threshold, a name that can be changed. It is looked up
+ * before those of the specification, so that it may take the place of one, such as a writable descriptor. */
 typedef struct {
     uint8_t param;
     uint8_t channel; /* 0: the device */

@@ -119,15 +119,15 @@ static void do_beacon_in_time(job_t *job, uint32_t count)
 static void do_answer(job_t *job, uint32_t count)
 {
     pdcp_arb_t *arb = &job->app->arb;
-    uint8_t node;
-    (void)pdcp_nodes_owner(&arb->bus.nodes, 1, &node);
+    uint8_t place;
+    (void)pdcp_tables_owner(&arb->bus.tables, 1, &place);
     const uint32_t requests = arb->bus.stats[PDCP_STAT_REQUESTS];
     for (uint32_t i = 0; i < count; i++) {
         const uint32_t number = i % job->log->answer_count;
         if (number == 0) {
-            check(arb->bus.nodes.nodes[node].state == PDCP_NODE_READY, "the setup did not end");
-            pdcp_setup_start(&arb->bus, node);
-            pdcp_setup_ask(&arb->bus, node);
+            check(arb->bus.tables.devices[place].state == PDCP_PLACE_READY, "the setup did not end");
+            pdcp_setup_start(&arb->bus, place);
+            pdcp_setup_ask(&arb->bus, place);
         }
         take(job, &job->log->answers[number]);
     }
@@ -145,12 +145,12 @@ static void do_bulk(job_t *job, uint32_t count)
         .dlc = 6,
         .data = {0x8C, 1, PDCP_DEV_DESCRIPTOR, 0, (uint8_t)(BULK_SIZE & 0xFFu), (uint8_t)(BULK_SIZE >> 8)}};
     can_frame_t packet = {.id = 0x201, .dlc = 8, .data = {PDCP_BULK_DATA, 0, 1, 2, 3, 4, 5, 6}};
-    uint8_t node;
-    (void)pdcp_nodes_owner(&job->app->arb.bus.nodes, 1, &node);
+    uint8_t place;
+    (void)pdcp_tables_owner(&job->app->arb.bus.tables, 1, &place);
     for (uint32_t i = 0; i < count; i++) {
         if (i % BULK_PACKETS == 0) {
             const pdcp_status_t status =
-                pdcp_arb_get(&job->app->arb, node, 0, PDCP_DEV_DESCRIPTOR, value, BULK_SIZE);
+                pdcp_arb_get(&job->app->arb, place, 0, PDCP_DEV_DESCRIPTOR, value, BULK_SIZE);
             check(status == PDCP_OK, "the request was refused");
             job->app->work = true;
             (void)arb_app_step(job->app, now_ms(job));
@@ -168,7 +168,8 @@ static void do_channel_data(job_t *job, uint32_t count)
 {
     const uint32_t before = job->app->arb.bus.stats[PDCP_STAT_CHANNEL_DATA];
     for (uint32_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        job->app->arb.bus.nodes.channels[i].enabled = true; /* else their data is a stranger's (D-BUS-36) */
+        job->app->arb.bus.tables.channels[i].enabled =
+            true; /* else their data is an unknown device's (D-BUS-36) */
     }
     for (uint32_t i = 0; i < count; i++) {
         const can_frame_t frame = {.id = (uint16_t)(PDCP_NODE_MAX - i % (2u * BENCH_DEVICES)), .dlc = 2};

@@ -7,7 +7,7 @@
 
 BENCH_SIZE(app, arb_app_t);
 BENCH_SIZE(arb, pdcp_arb_t);
-BENCH_SIZE(nodes, pdcp_nodes_t);
+BENCH_SIZE(tables, pdcp_tables_t);
 BENCH_SIZE(timers, pdcp_timers_t);
 BENCH_SIZE(txq, pdcp_txq_t);
 BENCH_SIZE(bind, pdcp_bind_t);

@@ -353,7 +353,7 @@ def test_arbitrator_beacons(join: Callable[[int], HandMade]) -> None:
     assert set(device.received(BEACON_OF_ARBITRATOR, 0x0A)) == {b"\x0a"}
 
 
-def test_a_beacon_from_a_stranger(join: Callable[[int], HandMade]) -> None:
+def test_a_beacon_from_an_unknown_device(join: Callable[[int], HandMade]) -> None:
     """D-BUS-15: an id that is not bound is told to reset, but not in the arbitrator's first 1200 ms."""
     device = join(0x45)
     device.beacons = True

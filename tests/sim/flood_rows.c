@@ -172,7 +172,7 @@ static void loose_plug(flood_t *flood, uint32_t ms)
     }
 }
 
-/* The same, and the contact bounces: what the arbitrator says to the stranger at once is not heard. */
+/* The same, and the contact bounces: what the arbitrator says to the unknown device at once is not heard. */
 static void bouncing_plug(flood_t *flood, uint32_t ms)
 {
     loose_plug(flood, ms);

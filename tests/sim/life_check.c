@@ -52,9 +52,9 @@ void life_check_counters(life_counters_t *counters, const arb_app_t *app, uint32
 
 /* --- When all is calm --- */
 
-static const pdcp_nodes_t *nodes_of(const limb_t *limb)
+static const pdcp_tables_t *tables_of(const limb_t *limb)
 {
-    return &limb->app.arb.bus.nodes;
+    return &limb->app.arb.bus.tables;
 }
 
 static const limb_part_t *part_of(const limb_t *limb, const pdcp_identity_t *identity)
@@ -71,17 +71,17 @@ static const limb_part_t *part_of(const limb_t *limb, const pdcp_identity_t *ide
 
 static const limb_part_t *owner_of(const limb_t *limb, const pdcp_channel_t *channel)
 {
-    return part_of(limb, &nodes_of(limb)->nodes[channel->node].identity);
+    return part_of(limb, &tables_of(limb)->devices[channel->place].identity);
 }
 
 /* The channel of the tables; NULL: its device is not set up. */
 static const pdcp_channel_t *find_channel(const limb_t *limb, const limb_part_t *part, uint8_t index)
 {
-    const pdcp_nodes_t *nodes = nodes_of(limb);
+    const pdcp_tables_t *tables = tables_of(limb);
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *channel = &nodes->channels[i];
-        if (channel->node != PDCP_NONE && channel->index == index && owner_of(limb, channel) == part &&
-            nodes->nodes[channel->node].state == PDCP_NODE_READY) {
+        const pdcp_channel_t *channel = &tables->channels[i];
+        if (channel->place != PDCP_NONE && channel->index == index && owner_of(limb, channel) == part &&
+            tables->devices[channel->place].state == PDCP_PLACE_READY) {
             return channel;
         }
     }
@@ -96,9 +96,9 @@ static bool is_active(const pdcp_channel_t *channel)
 static bool is_fed(const limb_t *limb, const pdcp_channel_t *output)
 {
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *input = &nodes_of(limb)->channels[i];
-        if (input->node != PDCP_NONE && is_active(input) &&
-            &nodes_of(limb)->channels[input->source.feed] == output) {
+        const pdcp_channel_t *input = &tables_of(limb)->channels[i];
+        if (input->place != PDCP_NONE && is_active(input) &&
+            &tables_of(limb)->channels[input->source.channel] == output) {
             return true;
         }
     }
@@ -126,9 +126,9 @@ static bool refuses_types(const limb_part_t *part, uint8_t index)
 /* An active link stands in both devices as it does in the tables. */
 static void check_active(const limb_t *limb, const limb_part_t *part, const pdcp_channel_t *input)
 {
-    const pdcp_channel_t *output = &nodes_of(limb)->channels[input->source.feed];
+    const pdcp_channel_t *output = &tables_of(limb)->channels[input->source.channel];
     const uint8_t index = input->index;
-    TEST_ASSERT_TRUE_MESSAGE(input->source.feed < PDCP_CHANNELS_MAX && output->node != PDCP_NONE,
+    TEST_ASSERT_TRUE_MESSAGE(input->source.channel < PDCP_CHANNELS_MAX && output->place != PDCP_NONE,
                              "an active link without source");
     const limb_part_t *feeder = owner_of(limb, output);
     if (feeder->node == NULL || find_channel(limb, feeder, output->index) != output) {
@@ -161,16 +161,16 @@ static bool is_being_silenced(const limb_t *limb, uint8_t number)
     const unsigned silences = (unsigned)PDCP_TODO_SILENCE | (unsigned)PDCP_TODO_REMOVE |
                               (unsigned)PDCP_TODO_CONNECT | (unsigned)PDCP_TODO_AGAIN;
     const pdcp_job_t *job = &limb->app.arb.bus.link.job;
-    return (nodes_of(limb)->channels[number].todo & silences) != 0 ||
-           (job->active && (job->input == number || job->output == number || job->old.feed == number));
+    return (tables_of(limb)->channels[number].todo & silences) != 0 ||
+           (job->active && (job->input == number || job->output == number || job->old.channel == number));
 }
 
 void life_check_silences(const limb_t *limb)
 {
-    const pdcp_nodes_t *nodes = nodes_of(limb);
+    const pdcp_tables_t *tables = tables_of(limb);
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *channel = &nodes->channels[i];
-        if (channel->node == PDCP_NONE || nodes->nodes[channel->node].state != PDCP_NODE_READY) {
+        const pdcp_channel_t *channel = &tables->channels[i];
+        if (channel->place == PDCP_NONE || tables->devices[channel->place].state != PDCP_PLACE_READY) {
             continue;
         }
         const limb_part_t *part = owner_of(limb, channel);
@@ -210,17 +210,18 @@ static bool has_needs(const limb_t *limb, const limb_part_t *part, uint8_t index
 
 static void check_input(const limb_t *limb, const limb_part_t *part, const pdcp_channel_t *input)
 {
-    const pdcp_nodes_t *nodes = nodes_of(limb);
-    const pdcp_channel_t *output = &nodes->channels[input->source.feed];
+    const pdcp_tables_t *tables = tables_of(limb);
+    const pdcp_channel_t *output = &tables->channels[input->source.channel];
     check_active(limb, part, input);
     if (!is_hosts(limb, part, input->index) &&
         (!has_needs(limb, part, input->index) || !has_needs(limb, owner_of(limb, output), output->index))) {
         complain(limb, part, input->index, "linked without what it requires");
     }
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *other = &nodes->channels[i];
-        if (other->node != PDCP_NONE && other != input && is_active(other) &&
-            other->source.feed == input->source.feed && (other->type & input->type & SOLE_ACCESS) != 0) {
+        const pdcp_channel_t *other = &tables->channels[i];
+        if (other->place != PDCP_NONE && other != input && is_active(other) &&
+            other->source.channel == input->source.channel &&
+            (other->type & input->type & SOLE_ACCESS) != 0) {
             complain(limb, part, input->index, "sole access is broken");
         }
     }
@@ -230,7 +231,7 @@ static void check_input(const limb_t *limb, const limb_part_t *part, const pdcp_
  * it is not asked again before it is set up again. */
 static void check_source(const limb_t *limb, const limb_part_t *part, const pdcp_channel_t *input)
 {
-    const uint8_t number = (uint8_t)(input - nodes_of(limb)->channels);
+    const uint8_t number = (uint8_t)(input - tables_of(limb)->channels);
     const pdcp_device_source_t *named = pdcp_device_source(sim_node_device(part->node), input->index);
     const bool names_one = named->channel != PDCP_NO_SOURCE_INDEX && named->channel != 0;
     const bool has_source = input->link != PDCP_LINK_NONE;
@@ -285,7 +286,7 @@ void life_check_calm(const limb_t *limb)
             check_channel(limb, part, index);
         }
     }
-    TEST_ASSERT_EQUAL_MESSAGE(there, pdcp_nodes_count_devices(nodes_of(limb)), "devices that count");
+    TEST_ASSERT_EQUAL_MESSAGE(there, pdcp_tables_count_devices(tables_of(limb)), "devices that count");
     TEST_ASSERT_FALSE_MESSAGE(arb_limb_is_busy(&limb->app.limb), "the planner is busy");
     TEST_ASSERT_TRUE_MESSAGE(pdcp_arb_links_settled(&limb->app.arb), "links are not settled");
     TEST_ASSERT_TRUE_MESSAGE(there == 0 || arb_limb_state(&limb->app.limb) == PROFILE_RUNNING,
@@ -311,8 +312,8 @@ bool life_check_is_calm_frame(const limb_t *limb, const can_frame_t *frame)
         return true;
     }
     for (int i = 0; i < PDCP_CHANNELS_MAX && frame->id == id; i++) {
-        const pdcp_channel_t *channel = &nodes_of(limb)->channels[i];
-        if (channel->node != PDCP_NONE && channel->transfer == PDCP_OUTPUT && channel->node_id == id) {
+        const pdcp_channel_t *channel = &tables_of(limb)->channels[i];
+        if (channel->place != PDCP_NONE && channel->transfer == PDCP_OUTPUT && channel->node_id == id) {
             return is_fed(limb, channel);
         }
     }

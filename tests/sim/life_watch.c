@@ -109,27 +109,27 @@ static void take_source(life_watch_t *watch, int part, uint8_t input, uint16_t k
 static void read_tables(life_watch_t *watch, uint32_t now_ms)
 {
     const limb_t *limb = watch->limb;
-    const pdcp_nodes_t *nodes = &limb->app.arb.bus.nodes;
+    const pdcp_tables_t *tables = &limb->app.arb.bus.tables;
     uint16_t keys[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1];
     int part_at[PDCP_DEVICES_MAX];
     memset(keys, 0xFF, sizeof keys);
     memset(watch->ready, 0, sizeof watch->ready);
     for (int i = 0; i < PDCP_DEVICES_MAX; i++) {
-        const pdcp_node_t *node = &nodes->nodes[i];
-        part_at[i] = node->state != PDCP_NODE_FREE ? first_with(limb, &node->identity) : -1;
+        const pdcp_device_entry_t *device = &tables->devices[i];
+        part_at[i] = device->state != PDCP_PLACE_FREE ? first_with(limb, &device->identity) : -1;
         if (part_at[i] >= 0) {
-            watch->ready[part_at[i]] = node->state == PDCP_NODE_READY;
+            watch->ready[part_at[i]] = device->state == PDCP_PLACE_READY;
         }
     }
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *input = &nodes->channels[i];
-        if (input->node == PDCP_NONE || input->transfer != PDCP_INPUT || input->link == PDCP_LINK_NONE ||
-            input->source.feed >= PDCP_CHANNELS_MAX || part_at[input->node] < 0) {
+        const pdcp_channel_t *input = &tables->channels[i];
+        if (input->place == PDCP_NONE || input->transfer != PDCP_INPUT || input->link == PDCP_LINK_NONE ||
+            input->source.channel >= PDCP_CHANNELS_MAX || part_at[input->place] < 0) {
             continue;
         }
-        const pdcp_channel_t *output = &nodes->channels[input->source.feed];
-        if (output->node != PDCP_NONE) {
-            keys[part_at[input->node]][input->index] = key_of(part_at[output->node], output->index);
+        const pdcp_channel_t *output = &tables->channels[input->source.channel];
+        if (output->place != PDCP_NONE) {
+            keys[part_at[input->place]][input->index] = key_of(part_at[output->place], output->index);
         }
     }
     for (int part = 0; part < limb->count; part++) {
@@ -239,14 +239,14 @@ void life_watch_frame(life_watch_t *watch, const can_frame_t *frame)
 /* Transfer enabled in the tables and in the devices. */
 static void check_flags(life_watch_t *watch)
 {
-    const pdcp_nodes_t *nodes = &watch->limb->app.arb.bus.nodes;
+    const pdcp_tables_t *tables = &watch->limb->app.arb.bus.tables;
     bool differs[LIFE_PARTS_MAX][LIFE_CHANNELS_MAX + 1] = {{false}};
     for (int i = 0; i < PDCP_CHANNELS_MAX && watch->limb->world.app != NULL; i++) {
-        const pdcp_channel_t *channel = &nodes->channels[i];
-        if (channel->node == PDCP_NONE || nodes->nodes[channel->node].state != PDCP_NODE_READY) {
+        const pdcp_channel_t *channel = &tables->channels[i];
+        if (channel->place == PDCP_NONE || tables->devices[channel->place].state != PDCP_PLACE_READY) {
             continue;
         }
-        const int part = first_with(watch->limb, &nodes->nodes[channel->node].identity);
+        const int part = first_with(watch->limb, &tables->devices[channel->place].identity);
         if (part >= 0 && is_bound(watch, part) &&
             pdcp_device_channel(device_of(watch, part), channel->index)->enabled != channel->enabled) {
             differs[part][channel->index] = true;

@@ -367,7 +367,7 @@ static int part_at(const limb_t *limb, uint8_t place)
 {
     for (int i = 0; i < limb->count; i++) {
         if (pdcp_identity_equal(&limb->parts[i].ini->desc.identity,
-                                &limb->app.arb.bus.nodes.nodes[place].identity)) {
+                                &limb->app.arb.bus.tables.devices[place].identity)) {
             return i;
         }
     }
@@ -378,11 +378,12 @@ static int part_at(const limb_t *limb, uint8_t place)
 /* The input of a part in the tables; NULL: it is not there. */
 static const pdcp_channel_t *input_of(const limb_t *limb, int part, uint8_t index)
 {
-    const pdcp_nodes_t *nodes = &limb->app.arb.bus.nodes;
-    const uint8_t place = pdcp_nodes_find(nodes, &limb->parts[part].ini->desc.identity);
-    const uint8_t channel = place != PDCP_NONE ? pdcp_nodes_channel(nodes, place, index) : PDCP_NONE;
-    return channel != PDCP_NONE && nodes->channels[channel].transfer == PDCP_INPUT ? &nodes->channels[channel]
-                                                                                   : NULL;
+    const pdcp_tables_t *tables = &limb->app.arb.bus.tables;
+    const uint8_t place = pdcp_tables_find(tables, &limb->parts[part].ini->desc.identity);
+    const uint8_t channel = place != PDCP_NONE ? pdcp_tables_channel(tables, place, index) : PDCP_NONE;
+    return channel != PDCP_NONE && tables->channels[channel].transfer == PDCP_INPUT
+               ? &tables->channels[channel]
+               : NULL;
 }
 
 static const pdcp_channel_t *active_input(const limb_t *limb, int part, uint8_t index)
@@ -393,17 +394,17 @@ static const pdcp_channel_t *active_input(const limb_t *limb, int part, uint8_t 
 
 void limb_links(const limb_t *limb, char text[LIMB_TEXT])
 {
-    const pdcp_nodes_t *nodes = &limb->app.arb.bus.nodes;
+    const pdcp_tables_t *tables = &limb->app.arb.bus.tables;
     int used = 0;
     text[0] = '\0';
     for (int part = 0; part < limb->count; part++) {
         for (uint8_t i = 1; i <= limb->parts[part].ini->desc.channel_count; i++) {
             const pdcp_channel_t *input = active_input(limb, part, i);
             if (input != NULL) {
-                const pdcp_channel_t *output = &nodes->channels[input->source.feed];
+                const pdcp_channel_t *output = &tables->channels[input->source.channel];
                 used +=
                     snprintf(&text[used], (size_t)(LIMB_TEXT - used), "%s%d.%u>%d.%u", used == 0 ? "" : " ",
-                             part_at(limb, output->node) + 1, output->index, part + 1, i);
+                             part_at(limb, output->place) + 1, output->index, part + 1, i);
                 TEST_ASSERT_LESS_THAN(LIMB_TEXT, used);
             }
         }
@@ -422,12 +423,12 @@ void limb_want(limb_t *limb, const char *links)
 /* Does an active link have this output as its source? */
 static bool is_source(const limb_t *limb, int part, uint8_t index)
 {
-    const pdcp_nodes_t *nodes = &limb->app.arb.bus.nodes;
+    const pdcp_tables_t *tables = &limb->app.arb.bus.tables;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *input = &nodes->channels[i];
-        if (input->node != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->source.feed != PDCP_NONE &&
-            nodes->channels[input->source.feed].index == index &&
-            part_at(limb, nodes->channels[input->source.feed].node) == part) {
+        const pdcp_channel_t *input = &tables->channels[i];
+        if (input->place != PDCP_NONE && input->link == PDCP_LINK_ACTIVE &&
+            input->source.channel != PDCP_NONE && tables->channels[input->source.channel].index == index &&
+            part_at(limb, tables->channels[input->source.channel].place) == part) {
             return true;
         }
     }
@@ -436,7 +437,7 @@ static bool is_source(const limb_t *limb, int part, uint8_t index)
 
 static void check_channel(const limb_t *limb, int part, uint8_t index)
 {
-    const pdcp_nodes_t *nodes = &limb->app.arb.bus.nodes;
+    const pdcp_tables_t *tables = &limb->app.arb.bus.tables;
     const pdcp_device_t *device = sim_node_device(limb->parts[part].node);
     const pdcp_device_channel_t *channel = pdcp_device_channel(device, index);
     const pdcp_channel_t *input = active_input(limb, part, index);
@@ -446,13 +447,13 @@ static void check_channel(const limb_t *limb, int part, uint8_t index)
         TEST_ASSERT_EQUAL_MESSAGE(is_source(limb, part, index), channel->enabled, name);
         return;
     }
-    const pdcp_channel_t *output = &nodes->channels[input->source.feed];
+    const pdcp_channel_t *output = &tables->channels[input->source.channel];
     const pdcp_device_source_t *source = pdcp_device_source(device, index);
     TEST_ASSERT_TRUE_MESSAGE(channel->enabled, name);
-    TEST_ASSERT_EQUAL_MESSAGE(nodes->nodes[output->node].node_id, channel->source_device, name);
+    TEST_ASSERT_EQUAL_MESSAGE(tables->devices[output->place].node_id, channel->source_device, name);
     TEST_ASSERT_EQUAL_MESSAGE(output->node_id, channel->source_channel, name);
     TEST_ASSERT_EQUAL_MESSAGE(output->index, source->channel, name);
-    TEST_ASSERT_EQUAL_HEX16_MESSAGE(nodes->nodes[output->node].identity.sn, source->identity.sn, name);
+    TEST_ASSERT_EQUAL_HEX16_MESSAGE(tables->devices[output->place].identity.sn, source->identity.sn, name);
     TEST_ASSERT_EQUAL_HEX16_MESSAGE(output->profile, source->profile, name);
 }
 

@@ -78,20 +78,20 @@ static void name_source(int part, uint8_t channel, uint16_t sn, uint8_t index)
 
 static bool input_agrees(const pdcp_channel_t *input, const pdcp_device_channel_t *there)
 {
-    const pdcp_nodes_t *nodes = &limb.app.arb.bus.nodes;
+    const pdcp_tables_t *tables = &limb.app.arb.bus.tables;
     if (input->link != PDCP_LINK_ACTIVE) {
         return !there->enabled;
     }
-    const pdcp_channel_t *output = &nodes->channels[input->source.feed];
-    return there->enabled && there->source_device == nodes->nodes[output->node].node_id &&
+    const pdcp_channel_t *output = &tables->channels[input->source.channel];
+    return there->enabled && there->source_device == tables->devices[output->place].node_id &&
            there->source_channel == output->node_id;
 }
 
 static bool is_fed(uint8_t output)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *input = &limb.app.arb.bus.nodes.channels[i];
-        if (input->node != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->source.feed == output) {
+        const pdcp_channel_t *input = &limb.app.arb.bus.tables.channels[i];
+        if (input->place != PDCP_NONE && input->link == PDCP_LINK_ACTIVE && input->source.channel == output) {
             return true;
         }
     }
@@ -100,13 +100,13 @@ static bool is_fed(uint8_t output)
 
 static bool part_agrees(int part)
 {
-    const pdcp_nodes_t *nodes = &limb.app.arb.bus.nodes;
-    const uint8_t place = pdcp_nodes_find(nodes, &limb.parts[part].ini->desc.identity);
+    const pdcp_tables_t *tables = &limb.app.arb.bus.tables;
+    const uint8_t place = pdcp_tables_find(tables, &limb.parts[part].ini->desc.identity);
     if (pdcp_device_suspended(device(part))) {
         return false;
     }
-    for (uint8_t c = nodes->nodes[place].first_channel; c != PDCP_NONE; c = nodes->channels[c].next) {
-        const pdcp_channel_t *channel = &nodes->channels[c];
+    for (uint8_t c = tables->devices[place].first_channel; c != PDCP_NONE; c = tables->channels[c].next) {
+        const pdcp_channel_t *channel = &tables->channels[c];
         const pdcp_device_channel_t *there = pdcp_device_channel(device(part), channel->index);
         if (channel->transfer == PDCP_INPUT) {
             if (!input_agrees(channel, there)) {
@@ -260,7 +260,7 @@ static void test_a_link_that_cannot_be_kept(void)
     (void)printf("a link that cannot be kept: given up after %u ms\n", (unsigned)ms);
     TEST_ASSERT_EQUAL(4, limb.events[PDCP_EVENT_AUDIT]);
     TEST_ASSERT_EQUAL_STRING("", text);
-    TEST_ASSERT_EQUAL(3, pdcp_nodes_count_links(&limb.app.arb.bus.nodes)); /* as inactive ones */
+    TEST_ASSERT_EQUAL(3, pdcp_tables_count_links(&limb.app.arb.bus.tables)); /* as inactive ones */
     limb_run_ms(&limb, 1000);
     limb_expect(&limb, "");
     limb_want(&limb, systems_get(2)->expected);

@@ -361,8 +361,8 @@ static int links_of_second(void)
 {
     int count = 0;
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *channel = &second.arb.bus.nodes.channels[i];
-        count += channel->node != PDCP_NONE && channel->link == PDCP_LINK_ACTIVE ? 1 : 0;
+        const pdcp_channel_t *channel = &second.arb.bus.tables.channels[i];
+        count += channel->place != PDCP_NONE && channel->link == PDCP_LINK_ACTIVE ? 1 : 0;
     }
     return count;
 }
@@ -480,7 +480,7 @@ static void test_all_links_are_removed(void)
     run_limb();
     TEST_ASSERT_EQUAL(3, limb_act(&limb, ARB_ACTION_CLEAR, 0));
     limb_expect(&limb, "");
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&limb.app.arb.bus.nodes));
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&limb.app.arb.bus.tables));
     for (int i = D2; i <= D3; i++) {
         const pdcp_device_t *device = sim_node_device(limb.parts[i].node);
         TEST_ASSERT_FALSE(pdcp_device_source_connected(pdcp_device_source(device, 1)));
@@ -687,14 +687,14 @@ static bool is_as_it_should_be(const char *text)
  * outputs to the hand require input 2 of their device. */
 static void expect_lawful(const char *text)
 {
-    const pdcp_channel_t *channels = limb.app.arb.bus.nodes.channels;
+    const pdcp_channel_t *channels = limb.app.arb.bus.tables.channels;
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
         for (int k = 0; k < i; k++) {
-            TEST_ASSERT_FALSE_MESSAGE(channels[i].node != PDCP_NONE && channels[i].link == PDCP_LINK_ACTIVE &&
-                                          channels[k].node != PDCP_NONE &&
-                                          channels[k].link == PDCP_LINK_ACTIVE &&
-                                          channels[i].source.feed == channels[k].source.feed,
-                                      text);
+            TEST_ASSERT_FALSE_MESSAGE(
+                channels[i].place != PDCP_NONE && channels[i].link == PDCP_LINK_ACTIVE &&
+                    channels[k].place != PDCP_NONE && channels[k].link == PDCP_LINK_ACTIVE &&
+                    channels[i].source.channel == channels[k].source.channel,
+                text);
         }
     }
     for (int controller = 2; controller <= 4; controller += 2) {

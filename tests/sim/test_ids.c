@@ -75,7 +75,7 @@ static void test_thirty_devices_are_back_within_2_s(void)
     limb_run_ms(&limb, 500);
     limb_start_arbitrator(&limb);
     limb_run_ms(&limb, 2000);
-    TEST_ASSERT_EQUAL(30, pdcp_nodes_count_devices(&limb.app.arb.bus.nodes));
+    TEST_ASSERT_EQUAL(30, pdcp_tables_count_devices(&limb.app.arb.bus.tables));
 }
 
 int main(void)

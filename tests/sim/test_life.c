@@ -783,7 +783,7 @@ static void expect_that_it_is_missed(bool stored)
     TEST_ASSERT_EQUAL_HEX16(0x2411, limb_ask(limb, 0x2410, input, sizeof input));
     limb_run_ms(limb, 100);
     limb_expect(limb, "");
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&limb->app.arb.bus.nodes));
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&limb->app.arb.bus.tables));
     TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(limb, 1, 1, 2, 1));
     limb_run_ms(limb, 100);
     limb_expect(limb, "1.1>2.1 2.2>3.1");
@@ -809,16 +809,16 @@ static void test_a_device_goes_while_sole_access_is_enforced(void)
 {
     limb_t *limb = begin_case();
     pdcp_arb_t *arb = &limb->app.arb;
-    const uint8_t place = pdcp_nodes_find(&arb->bus.nodes, &limb->parts[1].ini->desc.identity);
+    const uint8_t place = pdcp_tables_find(&arb->bus.tables, &limb->parts[1].ini->desc.identity);
     limb_power_off(limb, 2);
     limb_run_ms(limb, 1000);
     while (limb->lost.time_us == 0 &&
-           !pdcp_time_reached(sim_world_ms(&limb->world), arb->bus.nodes.nodes[2].heard_ms + 1400)) {
+           !pdcp_time_reached(sim_world_ms(&limb->world), arb->bus.tables.devices[2].heard_ms + 1400)) {
         limb_run_ms(limb, 1);
     }
     limb->world.bus.fault = lose_all;
     TEST_ASSERT_TRUE(
-        pdcp_arb_disconnect(arb, pdcp_nodes_channel(&arb->bus.nodes, place, 1))); /* unanswered: 300 ms */
+        pdcp_arb_disconnect(arb, pdcp_tables_channel(&arb->bus.tables, place, 1))); /* unanswered: 300 ms */
     profile_run_begin(&limb->app.limb.run, PROFILE_PLAN_ENFORCE, false);
     sim_world_touch_app(&limb->world);
     limb_run_ms(limb, 400);

@@ -70,7 +70,7 @@ static void test_a_limb_comes_alive(void)
 static void test_three_devices_are_ready_within_20_ms(void)
 {
     uint32_t ready_ms = 0;
-    while (pdcp_nodes_count_channels(&limb.app.arb.bus.nodes, PDCP_INPUT) < 4 && ready_ms < 1000) {
+    while (pdcp_tables_count_channels(&limb.app.arb.bus.tables, PDCP_INPUT) < 4 && ready_ms < 1000) {
         limb_run_ms(&limb, 1);
         ready_ms++;
     }
@@ -89,7 +89,7 @@ static void swap(int device, uint32_t away_ms)
     const uint8_t id = pdcp_device_node_id(sim_node_device(limb.parts[device].node));
     limb_power_off(&limb, device);
     limb_run_ms(&limb, 1600);
-    TEST_ASSERT_EQUAL(2, pdcp_nodes_count_devices(&limb.app.arb.bus.nodes));
+    TEST_ASSERT_EQUAL(2, pdcp_tables_count_devices(&limb.app.arb.bus.tables));
     limb_run_ms(&limb, away_ms);
     limb_power_on(&limb, device);
     limb_run_ms(&limb, 1000);

@@ -58,8 +58,8 @@ static bool all_ready(void)
 {
     int ready = 0;
     for (int i = 0; i < PDCP_DEVICES_MAX; i++) {
-        const pdcp_node_t *node = &limb.app.arb.bus.nodes.nodes[i];
-        ready += node->state == PDCP_NODE_READY && node->beaconed ? 1 : 0;
+        const pdcp_device_entry_t *device = &limb.app.arb.bus.tables.devices[i];
+        ready += device->state == PDCP_PLACE_READY && device->beaconed ? 1 : 0;
     }
     return ready == LIMB_DEVICES;
 }
@@ -68,8 +68,8 @@ static int active_links(void)
 {
     int active = 0;
     for (int i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        const pdcp_channel_t *channel = &limb.app.arb.bus.nodes.channels[i];
-        active += channel->node != PDCP_NONE && channel->link == PDCP_LINK_ACTIVE ? 1 : 0;
+        const pdcp_channel_t *channel = &limb.app.arb.bus.tables.channels[i];
+        active += channel->place != PDCP_NONE && channel->link == PDCP_LINK_ACTIVE ? 1 : 0;
     }
     return active;
 }

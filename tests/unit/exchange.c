@@ -92,7 +92,7 @@ void exchange_step(exchange_t *x)
 static bool is_held(const exchange_t *x)
 {
     for (int i = 0; i < PDCP_DEVICES_MAX; i++) {
-        if (x->arb->bus.nodes.nodes[i].state == PDCP_NODE_ASKED) {
+        if (x->arb->bus.tables.devices[i].state == PDCP_PLACE_ASKED) {
             return true;
         }
     }

@@ -16,9 +16,9 @@ const exchange_pair_t exchange_making[] = {
 
 void exchange_make_link(exchange_t *x)
 {
-    const pdcp_nodes_t *nodes = &x->arb->bus.nodes;
-    TEST_ASSERT_EQUAL(
-        PDCP_OK, pdcp_arb_connect(x->arb, pdcp_nodes_channel(nodes, 0, 1), pdcp_nodes_channel(nodes, 1, 1)));
+    const pdcp_tables_t *tables = &x->arb->bus.tables;
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x->arb, pdcp_tables_channel(tables, 0, 1),
+                                                pdcp_tables_channel(tables, 1, 1)));
     exchange_run(x, exchange_making);
     exchange_clear(x);
 }

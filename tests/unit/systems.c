@@ -10,7 +10,7 @@
 void systems_init(systems_t *s)
 {
     memset(s, 0, sizeof *s);
-    pdcp_nodes_init(&s->nodes);
+    pdcp_tables_init(&s->tables);
     profile_links_init(&s->links);
 }
 
@@ -111,7 +111,7 @@ bool systems_read(const char **text, systems_device_t *device)
 
 uint8_t systems_place(const systems_t *s, uint8_t name)
 {
-    const uint8_t place = pdcp_nodes_find(&s->nodes, &s->named[name]);
+    const uint8_t place = pdcp_tables_find(&s->tables, &s->named[name]);
     TEST_ASSERT_NOT_EQUAL_MESSAGE(PDCP_NONE, place, "device is not bound");
     return place;
 }
@@ -121,7 +121,7 @@ static uint8_t take_end(const systems_t *s, const char **at)
     const uint8_t place = systems_place(s, (uint8_t)take_number(at, 10));
     TEST_ASSERT_EQUAL_MESSAGE('.', **at, *at);
     ++*at;
-    const uint8_t channel = pdcp_nodes_channel(&s->nodes, place, (uint8_t)take_number(at, 10));
+    const uint8_t channel = pdcp_tables_channel(&s->tables, place, (uint8_t)take_number(at, 10));
     TEST_ASSERT_NOT_EQUAL_MESSAGE(PDCP_NONE, channel, *at);
     return channel;
 }
@@ -150,12 +150,12 @@ static bool take_link(const systems_t *s, const char **at, uint8_t *output, uint
 uint8_t systems_bind(systems_t *s, const systems_device_t *device)
 {
     uint8_t id = 1;
-    while (s->nodes.owner[id] != 0) {
+    while (s->tables.owner[id] != 0) {
         id++;
     }
-    const uint8_t place = pdcp_nodes_free_place(&s->nodes);
+    const uint8_t place = pdcp_tables_free_place(&s->tables);
     TEST_ASSERT_NOT_EQUAL(PDCP_NONE, place);
-    pdcp_nodes_add(&s->nodes, place, &device->identity, id);
+    pdcp_tables_add(&s->tables, place, &device->identity, id);
     if (device->name < SYSTEMS_NAMES) {
         s->named[device->name] = device->identity;
     }
@@ -173,27 +173,28 @@ static void put_set(systems_t *s, uint8_t channel, bool desired, uint32_t set)
             bytes[i / 8] = (uint8_t)(bytes[i / 8] | (0x80u >> (i % 8)));
         }
     }
-    pdcp_nodes_put_needs(&s->nodes, channel, desired, 0, bytes, sizeof bytes);
+    pdcp_tables_put_needs(&s->tables, channel, desired, 0, bytes, sizeof bytes);
 }
 
 void systems_set_up(systems_t *s, uint8_t place, const systems_device_t *device)
 {
-    TEST_ASSERT_TRUE(pdcp_nodes_set_channels(&s->nodes, place, device->count));
+    TEST_ASSERT_TRUE(pdcp_tables_set_channels(&s->tables, place, device->count));
     for (uint8_t i = 0; i < device->count; i++) {
-        pdcp_channel_t *channel = &s->nodes.channels[pdcp_nodes_channel(&s->nodes, place, (uint8_t)(i + 1))];
+        pdcp_channel_t *channel =
+            &s->tables.channels[pdcp_tables_channel(&s->tables, place, (uint8_t)(i + 1))];
         channel->transfer = device->channels[i].transfer;
         channel->type = device->channels[i].type;
         channel->profile = device->channels[i].profile;
         channel->terminal_profile = device->channels[i].terminal_profile;
     }
-    TEST_ASSERT_TRUE(pdcp_nodes_make_needs(&s->nodes, place));
+    TEST_ASSERT_TRUE(pdcp_tables_make_needs(&s->tables, place));
     for (uint8_t i = 0; i < device->count; i++) {
-        const uint8_t channel = pdcp_nodes_channel(&s->nodes, place, (uint8_t)(i + 1));
+        const uint8_t channel = pdcp_tables_channel(&s->tables, place, (uint8_t)(i + 1));
         put_set(s, channel, false, device->channels[i].required);
         put_set(s, channel, true, device->channels[i].desired);
     }
-    s->nodes.nodes[place].state = PDCP_NODE_READY;
-    s->nodes.nodes[place].beaconed = true;
+    s->tables.devices[place].state = PDCP_PLACE_READY;
+    s->tables.devices[place].beaconed = true;
 }
 
 void systems_add(systems_t *s, const char *devices)
@@ -206,12 +207,12 @@ void systems_add(systems_t *s, const char *devices)
 
 void systems_lose(systems_t *s, uint8_t place)
 {
-    s->nodes.nodes[place].state = PDCP_NODE_LOST;
+    s->tables.devices[place].state = PDCP_PLACE_LOST;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        pdcp_channel_t *channel = &s->nodes.channels[i];
-        const bool own = channel->node == place;
-        const bool fed = channel->node != PDCP_NONE && channel->source.feed != PDCP_NONE &&
-                         s->nodes.channels[channel->source.feed].node == place;
+        pdcp_channel_t *channel = &s->tables.channels[i];
+        const bool own = channel->place == place;
+        const bool fed = channel->place != PDCP_NONE && channel->source.channel != PDCP_NONE &&
+                         s->tables.channels[channel->source.channel].place == place;
         if ((own || fed) && channel->link == PDCP_LINK_ACTIVE) {
             channel->link = PDCP_LINK_INACTIVE;
         }
@@ -220,13 +221,13 @@ void systems_lose(systems_t *s, uint8_t place)
 
 void systems_return(systems_t *s, uint8_t place)
 {
-    s->nodes.nodes[place].state = PDCP_NODE_READY;
+    s->tables.devices[place].state = PDCP_PLACE_READY;
 }
 
 void systems_forget(systems_t *s, uint8_t place)
 {
     systems_lose(s, place);
-    pdcp_nodes_remove(&s->nodes, place);
+    pdcp_tables_remove(&s->tables, place);
 }
 
 /* --- Links --- */
@@ -234,8 +235,8 @@ void systems_forget(systems_t *s, uint8_t place)
 static void put_entry(systems_t *s, uint8_t output, uint8_t input, bool by_host)
 {
     profile_link_t link;
-    profile_channel_end(&s->nodes, output, &link.output);
-    profile_channel_end(&s->nodes, input, &link.input);
+    profile_channel_end(&s->tables, output, &link.output);
+    profile_channel_end(&s->tables, input, &link.input);
     TEST_ASSERT_TRUE(profile_links_put(&s->links, &link, by_host));
 }
 
@@ -250,11 +251,11 @@ void systems_configure(systems_t *s, const char *links, bool by_host)
 
 void systems_connect(systems_t *s, uint8_t output, uint8_t input)
 {
-    pdcp_channel_t *channel = &s->nodes.channels[input];
-    const pdcp_channel_t *source = &s->nodes.channels[output];
+    pdcp_channel_t *channel = &s->tables.channels[input];
+    const pdcp_channel_t *source = &s->tables.channels[output];
     channel->link = PDCP_LINK_ACTIVE;
-    channel->source.feed = output;
-    channel->source.identity = s->nodes.nodes[source->node].identity;
+    channel->source.channel = output;
+    channel->source.identity = s->tables.devices[source->place].identity;
     channel->source.index = source->index;
     channel->source.type = source->type;
     channel->source.profile = source->profile;
@@ -271,7 +272,7 @@ void systems_link(systems_t *s, const char *links)
 
 profile_scene_t systems_scene(systems_t *s)
 {
-    profile_scene_t scene = {.nodes = &s->nodes, .links = &s->links, .banned_count = s->banned_count};
+    profile_scene_t scene = {.tables = &s->tables, .links = &s->links, .banned_count = s->banned_count};
     memcpy(scene.made, s->made, sizeof scene.made);
     memcpy(scene.awaited, s->awaited, sizeof scene.awaited);
     memcpy(scene.banned, s->banned, sizeof scene.banned);
@@ -303,17 +304,17 @@ static bool stands_in(const systems_t *s, uint8_t input)
 /* A link that is not wanted: one of the configuration rests, another one goes. */
 static void take_link_away(systems_t *s, uint8_t input)
 {
-    pdcp_channel_t *channel = &s->nodes.channels[input];
-    const uint8_t entry = profile_links_of(&s->links, &s->nodes, input);
+    pdcp_channel_t *channel = &s->tables.channels[input];
+    const uint8_t entry = profile_links_of(&s->links, &s->tables, input);
     if (entry != PDCP_NONE &&
-        channel->source.feed ==
-            profile_links_channel(&s->links, &s->nodes, &s->links.entries[entry].output, PDCP_OUTPUT)) {
+        channel->source.channel ==
+            profile_links_channel(&s->links, &s->tables, &s->links.entries[entry].output, PDCP_OUTPUT)) {
         channel->link = PDCP_LINK_INACTIVE;
         return;
     }
     channel->link = PDCP_LINK_NONE;
-    channel->source.feed = PDCP_NONE;
-    pdcp_nodes_clear_source(channel);
+    channel->source.channel = PDCP_NONE;
+    pdcp_tables_clear_source(channel);
 }
 
 void systems_execute(systems_t *s)
@@ -322,12 +323,13 @@ void systems_execute(systems_t *s)
         const uint8_t output = s->plan.want[i];
         if (output != PDCP_NONE) {
             systems_connect(s, output, i);
-        } else if (s->nodes.channels[i].node != PDCP_NONE && s->nodes.channels[i].link == PDCP_LINK_ACTIVE) {
+        } else if (s->tables.channels[i].place != PDCP_NONE &&
+                   s->tables.channels[i].link == PDCP_LINK_ACTIVE) {
             take_link_away(s, i);
         }
     }
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
-        if (s->plan.want[i] != PDCP_NONE && profile_links_of(&s->links, &s->nodes, i) == PDCP_NONE &&
+        if (s->plan.want[i] != PDCP_NONE && profile_links_of(&s->links, &s->tables, i) == PDCP_NONE &&
             !stands_in(s, i)) {
             put_entry(s, s->plan.want[i], i, false);
         }
@@ -337,7 +339,7 @@ void systems_execute(systems_t *s)
 static unsigned name_of(const systems_t *s, uint8_t channel)
 {
     for (unsigned n = 0; n < SYSTEMS_NAMES; n++) {
-        const pdcp_node_t *owner = &s->nodes.nodes[s->nodes.channels[channel].node];
+        const pdcp_device_entry_t *owner = &s->tables.devices[s->tables.channels[channel].place];
         if (pdcp_identity_equal(&s->named[n], &owner->identity)) {
             return n;
         }
@@ -350,14 +352,14 @@ void systems_planned(const systems_t *s, char text[SYSTEMS_TEXT])
     int used = 0;
     text[0] = '\0';
     for (unsigned n = 0; n < SYSTEMS_NAMES; n++) {
-        const uint8_t place = pdcp_nodes_find(&s->nodes, &s->named[n]);
-        uint8_t i = place != PDCP_NONE ? s->nodes.nodes[place].first_channel : PDCP_NONE;
-        for (; i != PDCP_NONE; i = s->nodes.channels[i].next) {
+        const uint8_t place = pdcp_tables_find(&s->tables, &s->named[n]);
+        uint8_t i = place != PDCP_NONE ? s->tables.devices[place].first_channel : PDCP_NONE;
+        for (; i != PDCP_NONE; i = s->tables.channels[i].next) {
             const uint8_t output = s->plan.want[i];
             if (output != PDCP_NONE) {
                 used += snprintf(&text[used], (size_t)(SYSTEMS_TEXT - used), "%s%u.%u>%u.%u",
-                                 used == 0 ? "" : " ", name_of(s, output), s->nodes.channels[output].index, n,
-                                 s->nodes.channels[i].index);
+                                 used == 0 ? "" : " ", name_of(s, output), s->tables.channels[output].index,
+                                 n, s->tables.channels[i].index);
                 TEST_ASSERT_LESS_THAN(SYSTEMS_TEXT, used);
             }
         }

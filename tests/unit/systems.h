@@ -9,7 +9,7 @@
 #ifndef SYSTEMS_H
 #define SYSTEMS_H
 
-#include "pdcp_nodes.h"
+#include "pdcp_tables.h"
 #include "profile_links.h"
 #include "profile_plan.h"
 
@@ -33,7 +33,7 @@ typedef struct {
 
 /* All that a plan is made from, and the plan. */
 typedef struct {
-    pdcp_nodes_t nodes;
+    pdcp_tables_t tables;
     profile_links_t links;
     profile_board_t plan;
     uint8_t made[PROFILE_CHANNEL_BYTES];
@@ -54,7 +54,7 @@ bool systems_read(const char **text, systems_device_t *device);
 /* A device takes a place, without channels. Returns the place. */
 uint8_t systems_bind(systems_t *s, const systems_device_t *device);
 
-/* Its channels appear and it is set up. They may have been made before by pdcp_nodes_set_channels. */
+/* Its channels appear and it is set up. They may have been made before by pdcp_tables_set_channels. */
 void systems_set_up(systems_t *s, uint8_t place, const systems_device_t *device);
 
 /* The devices of a text are bound and set up. */

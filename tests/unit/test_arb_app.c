@@ -262,7 +262,7 @@ static void test_a_link_waits_for_a_running_setup(void)
             exchange_rx(&x, "013#0A");
         }
         /* every attempt ends after 300 ms, and the third is the last: keep it in its setup */
-        x.arb->bus.nodes.nodes[2].setup_attempts = 0;
+        x.arb->bus.tables.devices[2].setup_attempts = 0;
         hostlink_silence();
     }
     exchange_wait(&x, 1);

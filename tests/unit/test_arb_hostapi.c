@@ -220,12 +220,12 @@ static void test_passthrough_of_a_beacon_interval(void)
     exchange_tx(&x, "311#04 0A 00 D007");
     exchange_rx(&x, "211#84 01 0A 00 D007");
     expect(0x230B, PASS(6, 0x84, 1, 10, 0, 0xD0, 7, 0, 0));
-    TEST_ASSERT_EQUAL(2000, x.arb->bus.nodes.nodes[0].beacon_ms);
+    TEST_ASSERT_EQUAL(2000, x.arb->bus.tables.devices[0].beacon_ms);
     ask(0x230A, PASS(5, 4, 10, 0, 0x64, 0, 0, 0, 0));
     exchange_tx(&x, "311#04 0A 00 6400");
     exchange_rx(&x, "211#84 00 0A 00"); /* refused: as before */
     expect(0x230B, PASS(4, 0x84, 0, 10, 0, 0, 0, 0, 0));
-    TEST_ASSERT_EQUAL(2000, x.arb->bus.nodes.nodes[0].beacon_ms);
+    TEST_ASSERT_EQUAL(2000, x.arb->bus.tables.devices[0].beacon_ms);
 }
 
 /* A device that was reset is lost until it binds again, also when the host has done it by hand. */
@@ -285,8 +285,8 @@ static void test_passthrough_to_all_on_standby(void)
 static void test_parameters_that_are_the_arbitrators(void)
 {
     add_devices();
-    pdcp_nodes_t *nodes = &x.arb->bus.nodes;
-    nodes->channels[pdcp_nodes_channel(nodes, 1, 1)].link = PDCP_LINK_INACTIVE;
+    pdcp_tables_t *tables = &x.arb->bus.tables;
+    tables->channels[pdcp_tables_channel(tables, 1, 1)].link = PDCP_LINK_INACTIVE;
     ask(0x2304, BYTES(DEV_OUT, 0, 8, 0x22));
     expect_error(0x2306, 0x0E);
     ask(0x2304, BYTES(DEV_OUT, 1, 5, 0x22));
@@ -326,13 +326,13 @@ static void test_a_transfer_that_the_host_enables(void)
     exchange_tx(&x, "311#04 04 01 01");
     exchange_rx(&x, "211#84 01 04 01 01");
     expect(0x2305, NULL, 0);
-    const uint8_t output = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
-    TEST_ASSERT_TRUE(x.arb->bus.nodes.channels[output].enabled);
+    const uint8_t output = pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
+    TEST_ASSERT_TRUE(x.arb->bus.tables.channels[output].enabled);
     ask(0x2304, BYTES(DEV_OUT, 1, 4, 0));
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01 00");
     expect(0x2305, NULL, 0);
-    TEST_ASSERT_FALSE(x.arb->bus.nodes.channels[output].enabled);
+    TEST_ASSERT_FALSE(x.arb->bus.tables.channels[output].enabled);
 }
 
 /* --- reset --- */
@@ -414,7 +414,7 @@ static void test_a_reset_of_an_empty_bus(void)
 static void test_a_reset_behind_a_long_transfer(void)
 {
     exchange_add_output(&x, "FE");
-    x.arb->bus.nodes.nodes[0].ack_ms = 500;
+    x.arb->bus.tables.devices[0].ack_ms = 500;
     pdcp_request_get(&x.arb->bus, 0, PDCP_CLIENT_NONE, 0, 7, 512);
     exchange_tx(&x, "311#03 07 00");
     ask(0x230D, BYTES(0));
@@ -425,7 +425,7 @@ static void test_a_reset_behind_a_long_transfer(void)
     }
     exchange_wait(&x, 1);
     expect(0x230F, BYTES(0, 0, 0, 0, 0, 0, 0, 0));
-    TEST_ASSERT_FALSE(x.arb->bus.nodes.nodes[0].reset_asked);
+    TEST_ASSERT_FALSE(x.arb->bus.tables.devices[0].reset_asked);
 }
 
 /* D-BUS-12: the arbitrator forgets all devices in the middle of it. */
@@ -468,10 +468,10 @@ static void add_second_input(void)
     exchange_rx(&x, "013#0A");
 }
 
-static pdcp_channel_t *channel(uint8_t node)
+static pdcp_channel_t *channel(uint8_t place)
 {
-    pdcp_nodes_t *nodes = &x.arb->bus.nodes;
-    return &nodes->channels[pdcp_nodes_channel(nodes, node, 1)];
+    pdcp_tables_t *tables = &x.arb->bus.tables;
+    return &tables->channels[pdcp_tables_channel(tables, place, 1)];
 }
 
 /* D-API-4, 08h: an output feeds no more than one input that wants it for itself (5300h has the bit). */
@@ -480,7 +480,7 @@ static void test_sole_access(void)
     add_devices();
     add_second_input();
     channel(1)->link = PDCP_LINK_INACTIVE; /* remembered: it comes back */
-    channel(1)->source.identity = x.arb->bus.nodes.nodes[0].identity;
+    channel(1)->source.identity = x.arb->bus.tables.devices[0].identity;
     channel(1)->source.index = 1;
     ask(0x2307, BYTES(DEV_OUT, 1, 2, 0, 2, 0, 7, 0, 1));
     expect_error(0x2309, 0x08);
@@ -492,12 +492,12 @@ static void test_sole_access(void)
 }
 
 /* The input of this device has a link to the output. */
-static void remember_link(uint8_t node, uint8_t status)
+static void remember_link(uint8_t place, uint8_t status)
 {
-    channel(node)->link = status;
-    channel(node)->source.feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
-    channel(node)->source.identity = x.arb->bus.nodes.nodes[0].identity;
-    channel(node)->source.index = 1;
+    channel(place)->link = status;
+    channel(place)->source.channel = pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
+    channel(place)->source.identity = x.arb->bus.tables.devices[0].identity;
+    channel(place)->source.index = 1;
 }
 
 /* D-API-13: an input that has the link already, inactive, does not get it while another one works. One that
@@ -549,7 +549,7 @@ static void test_sole_access_of_a_link_that_waits(void)
 static void test_an_output_without_a_node_id(void)
 {
     add_devices();
-    x.arb->bus.nodes.nodes[0].state = PDCP_NODE_FAILED;
+    x.arb->bus.tables.devices[0].state = PDCP_PLACE_FAILED;
     channel(0)->node_id = 0;
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
     expect_error(0x2309, 0x09);
@@ -563,10 +563,10 @@ static void test_an_output_for_its_own_device(void)
     add_devices();
     add_second_input();
     channel(2)->link = PDCP_LINK_INACTIVE; /* another input has it for itself: that comes second */
-    channel(2)->source.identity = x.arb->bus.nodes.nodes[0].identity;
+    channel(2)->source.identity = x.arb->bus.tables.devices[0].identity;
     channel(2)->source.index = 1;
-    channel(1)->node = 0;
-    channel(0)->next = pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+    channel(1)->place = 0;
+    channel(0)->next = pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
     channel(1)->index = 2;
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_OUT, 2));
     expect_error(0x2309, 0x0F);
@@ -787,7 +787,7 @@ static void expect_that_it_is_undone(uint32_t quiet_ms)
     add_devices();
     exchange_pass(&x, quiet_ms);
     exchange_beacons(&x);
-    x.arb->bus.nodes.nodes[1].ack_ms = 500;
+    x.arb->bus.tables.devices[1].ack_ms = 500;
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
     while (!answered_within(1400, &ms, 0x2309, 0x05)) {
         exchange_beacons(&x);

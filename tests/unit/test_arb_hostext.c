@@ -157,7 +157,7 @@ static void test_an_action_waits_for_a_running_setup(void)
             exchange_rx(&x, "011#0A");
             exchange_rx(&x, "013#0A");
         }
-        x.arb->bus.nodes.nodes[1].setup_attempts = 0; /* keeps it in its setup */
+        x.arb->bus.tables.devices[1].setup_attempts = 0; /* keeps it in its setup */
         TEST_ASSERT_EQUAL(0, hostlink_waiting());
     }
     exchange_wait(&x, 1);
@@ -439,9 +439,9 @@ static void test_the_device_goes_while_its_link_is_removed(void)
 static void test_a_link_is_removed_too_slowly(void)
 {
     make_link();
-    x.arb->bus.nodes.nodes[0].beacon_ms = 10000;
-    x.arb->bus.nodes.nodes[1].beacon_ms = 10000;
-    x.arb->bus.nodes.nodes[1].ack_ms = 500;
+    x.arb->bus.tables.devices[0].beacon_ms = 10000;
+    x.arb->bus.tables.devices[1].beacon_ms = 10000;
+    x.arb->bus.tables.devices[1].ack_ms = 500;
     ask(0x2410, BYTES(DEV_IN, 1));
     int writes = 0;
     for (int ms = 0; ms < 3000; ms++) {

@@ -19,17 +19,17 @@ void tearDown(void) {}
 
 static uint8_t output(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
 }
 
 static uint8_t input(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
 }
 
 static const pdcp_channel_t *the_input(void)
 {
-    return &x.arb->bus.nodes.channels[input()];
+    return &x.arb->bus.tables.channels[input()];
 }
 
 static void begin(bool planned)
@@ -132,7 +132,7 @@ static void test_an_input_without_a_link(void)
 /* One that named a source when it was set up is left to the profile layer until that has decided. */
 static void test_an_input_whose_source_is_not_decided(void)
 {
-    x.arb->bus.nodes.channels[input()].source.index = 1;
+    x.arb->bus.tables.channels[input()].source.index = 1;
     pdcp_arb_plan_links(x.arb, false);
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 239);
@@ -177,19 +177,19 @@ static void test_an_input_that_refused_to_be_disabled(void)
 /* D-BUS-60: a host may read an output without a link: what it has enabled stays enabled. */
 static void test_an_output_that_the_host_has_enabled(void)
 {
-    x.arb->bus.nodes.channels[output()].enabled = true;
+    x.arb->bus.tables.channels[output()].enabled = true;
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 180);
     ask("311#03 04 01", "211#83 01 04 01 01");
     exchange_silence(&x);
-    TEST_ASSERT_TRUE(x.arb->bus.nodes.channels[output()].enabled);
+    TEST_ASSERT_TRUE(x.arb->bus.tables.channels[output()].enabled);
     TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
 /* It may have become silent on its own: then the tables learn it. */
 static void test_an_input_that_was_disabled_by_itself(void)
 {
-    x.arb->bus.nodes.channels[input()].enabled = true;
+    x.arb->bus.tables.channels[input()].enabled = true;
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 180);
     ask("311#03 04 01", "211#83 01 04 01 00");
@@ -291,7 +291,7 @@ static void link_second_input(void)
     exchange_run(&x, binding);
     exchange_rx(&x, "013#0A");
     TEST_ASSERT_EQUAL(PDCP_OK,
-                      pdcp_arb_connect(x.arb, output(), pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)));
+                      pdcp_arb_connect(x.arb, output(), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
     exchange_run(&x, linking);
     exchange_clear(&x);
 }
@@ -324,7 +324,7 @@ static void test_an_output_that_is_not_kept(void)
     exchange_run(&x, silencing);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE,
-                      x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)].link);
+                      x.arb->bus.tables.channels[pdcp_tables_channel(&x.arb->bus.tables, 2, 1)].link);
 }
 
 /* An answer is compared only if neither the entry nor a job has changed since the question. */
@@ -368,7 +368,7 @@ static void test_an_answer_about_a_link_that_is_gone(void)
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
 }
 
-/* While a device is set up, a link is made or a wish waits, nothing is asked. */
+/* While a device is set up, a link is made or a link request waits, nothing is asked. */
 static void test_everything_else_comes_first(void)
 {
     begin(false);
@@ -508,29 +508,29 @@ static unsigned spare; /* and those for channels without a link */
 
 static void build_limb(void)
 {
-    pdcp_nodes_t *nodes = &x.arb->bus.nodes;
-    pdcp_nodes_init(nodes);
+    pdcp_tables_t *tables = &x.arb->bus.tables;
+    pdcp_tables_init(tables);
     for (unsigned at = 0; at < DEVICES; at++) {
         const uint8_t place = (uint8_t)at;
         const pdcp_identity_t identity = {2, 2, (uint16_t)(place + 1)};
-        pdcp_nodes_add(nodes, place, &identity, (uint8_t)(place + 1));
-        nodes->nodes[place].state = PDCP_NODE_READY;
-        nodes->nodes[place].ack_ms = 100;
-        TEST_ASSERT_TRUE(pdcp_nodes_set_channels(nodes, place, CHANNELS / DEVICES));
+        pdcp_tables_add(tables, place, &identity, (uint8_t)(place + 1));
+        tables->devices[place].state = PDCP_PLACE_READY;
+        tables->devices[place].ack_ms = 100;
+        TEST_ASSERT_TRUE(pdcp_tables_set_channels(tables, place, CHANNELS / DEVICES));
     }
     for (unsigned i = 0; i < CHANNELS; i++) {
-        pdcp_channel_t *channel = &nodes->channels[i];
+        pdcp_channel_t *channel = &tables->channels[i];
         channel->transfer = i % 4 < 2 ? PDCP_OUTPUT : PDCP_INPUT;
         channel->enabled = true;
         if (channel->transfer == PDCP_OUTPUT) {
-            pdcp_nodes_set_output_id(nodes, channel, (uint8_t)(254 - i));
+            pdcp_tables_set_output_id(tables, channel, (uint8_t)(254 - i));
         }
     }
     for (unsigned i = 2; i < CHANNELS; i += i % 4 == 2 ? 1 : 3) {
-        pdcp_channel_t *channel = &nodes->channels[i];
-        channel->source.feed = (uint8_t)((i + 2) % CHANNELS); /* an output of the next device */
-        channel->source.identity = nodes->nodes[nodes->channels[channel->source.feed].node].identity;
-        channel->source.index = nodes->channels[channel->source.feed].index;
+        pdcp_channel_t *channel = &tables->channels[i];
+        channel->source.channel = (uint8_t)((i + 2) % CHANNELS); /* an output of the next device */
+        channel->source.identity = tables->devices[tables->channels[channel->source.channel].place].identity;
+        channel->source.index = tables->channels[channel->source.channel].index;
         channel->link = PDCP_LINK_ACTIVE;
     }
 }
@@ -544,9 +544,9 @@ static uint32_t bits_of(uint8_t dlc)
 /* What the device answers when all is as it should be. */
 static void answer(uint8_t number, uint8_t param)
 {
-    const pdcp_nodes_t *nodes = &x.arb->bus.nodes;
-    const pdcp_channel_t *channel = &nodes->channels[number];
-    can_frame_t frame = {.id = (uint16_t)(0x200u | nodes->nodes[channel->node].node_id),
+    const pdcp_tables_t *tables = &x.arb->bus.tables;
+    const pdcp_channel_t *channel = &tables->channels[number];
+    can_frame_t frame = {.id = (uint16_t)(0x200u | tables->devices[channel->place].node_id),
                          .dlc = 5,
                          .data = {0x83, 1, param, channel->index, channel->enabled ? 1 : 0}};
     if (param == 5 && channel->transfer == PDCP_OUTPUT) {
@@ -561,8 +561,8 @@ static void answer(uint8_t number, uint8_t param)
         frame.data[6] = channel->source.index;
     } else if (param == 7) {
         frame.dlc = 6;
-        frame.data[4] = nodes->nodes[nodes->channels[channel->source.feed].node].node_id;
-        frame.data[5] = nodes->channels[channel->source.feed].node_id;
+        frame.data[4] = tables->devices[tables->channels[channel->source.channel].place].node_id;
+        frame.data[5] = tables->channels[channel->source.channel].node_id;
     }
     bus_bits += bits_of(frame.dlc);
     (void)pdcp_arb_on_frame(x.arb, x.now_ms, &frame);
@@ -574,15 +574,15 @@ static void on_question(const can_frame_t *frame, uint32_t ms)
     TEST_ASSERT_EQUAL_HEX16(0x300, frame->id & 0x700u);
     TEST_ASSERT_EQUAL(3, frame->dlc);
     TEST_ASSERT_EQUAL_HEX8(0x03, frame->data[0]);
-    TEST_ASSERT_TRUE(pdcp_nodes_owner(&x.arb->bus.nodes, (uint8_t)(frame->id & 0xFFu), &place));
-    const uint8_t number = pdcp_nodes_channel(&x.arb->bus.nodes, place, frame->data[2]);
+    TEST_ASSERT_TRUE(pdcp_tables_owner(&x.arb->bus.tables, (uint8_t)(frame->id & 0xFFu), &place));
+    const uint8_t number = pdcp_tables_channel(&x.arb->bus.tables, place, frame->data[2]);
     const uint8_t param = frame->data[1];
     uint32_t *last = &last_ms[number][param - 4];
     TEST_ASSERT_LESS_THAN_UINT32(LIMIT_MS, ms - *last);
     *last = ms;
     bus_bits += bits_of(frame->dlc);
     asked++;
-    if (!x.arb->bus.nodes.channels[number].enabled) {
+    if (!x.arb->bus.tables.channels[number].enabled) {
         TEST_ASSERT_EQUAL(4, param);
         spare++;
     }
@@ -646,12 +646,12 @@ static void test_a_turn_with_channels_that_have_no_link(void)
     exchange_start(&x, 0xFFFFFF00u);
     build_limb();
     for (unsigned i = 0; i < CHANNELS; i++) {
-        pdcp_channel_t *channel = &x.arb->bus.nodes.channels[i];
+        pdcp_channel_t *channel = &x.arb->bus.tables.channels[i];
         if (i % 4 < 2) {
             channel->enabled = i == 0;
         } else {
-            channel->source.feed = 0;
-            channel->source.identity = x.arb->bus.nodes.nodes[0].identity;
+            channel->source.channel = 0;
+            channel->source.identity = x.arb->bus.tables.devices[0].identity;
             channel->source.index = 1;
         }
     }

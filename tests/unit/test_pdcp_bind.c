@@ -31,10 +31,10 @@ static void test_a_free_id_is_granted(void)
 static void test_a_device_counts_from_its_first_beacon(void)
 {
     exchange_rx(&x, "620#01 3412 7856 BC9A");
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_devices(&x.arb->bus.tables));
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_BOUND));
     exchange_rx(&x, "020#0A");
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_devices(&x.arb->bus.tables));
     exchange_rx(&x, "020#0A");
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_BOUND));
 }
@@ -67,7 +67,7 @@ static void test_a_suggested_id_is_reserved(void)
 {
     exchange_rx(&x, "600#01 0100 0100 0100");
     exchange_tx(&x, "300#81 01 0100 0100 0100");
-    exchange_rx(&x, "601#01 0200 0200 0200"); /* a stranger asks for it */
+    exchange_rx(&x, "601#01 0200 0200 0200"); /* an unknown device asks for it */
     exchange_tx(&x, "301#81 02 0200 0200 0200");
     exchange_pass(&x, 989); /* and three requests are held for 5 ms (D-BUS-42) */
     exchange_rx(&x, "601#01 0300 0300 0300");
@@ -93,7 +93,7 @@ static void test_an_identity_keeps_its_id(void)
     exchange_add_output(&x, "FE"); /* remembered when it is set up (D-BUS-43) */
     exchange_pass(&x, 12000);      /* lost, and forgotten */
     (void)exchange_drain(&x);
-    TEST_ASSERT_EQUAL(PDCP_NODE_FREE, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_FREE, x.arb->bus.tables.devices[0].state);
     exchange_rx(&x, "630#01 0200 0200 0400");
     exchange_tx(&x, "330#81 11 0200 0200 0400");
     exchange_rx(&x, "611#01 0200 0200 0400");
@@ -109,7 +109,7 @@ static void test_a_remembered_id_is_given_away_last(void)
     exchange_tx(&x, "320#81 01 3412 7856 BC9A");
     for (unsigned id = PDCP_NODE_MIN; id <= PDCP_NODE_MAX; id++) {
         if (id != 0x20) {
-            x.arb->bus.nodes.owner[id] = 0x80u | 40u; /* as if all others were in use */
+            x.arb->bus.tables.owner[id] = 0x80u | 40u; /* as if all others were in use */
         }
     }
     exchange_pass(&x, 1000);
@@ -179,7 +179,7 @@ static void test_a_refused_device_keeps_its_reservation(void)
     fill_the_bus(2);
     exchange_rx(&x, "6C0#01 0900 0900 0900");
     exchange_tx(&x, "3C0#81 00 0900 0900 0900");
-    pdcp_nodes_remove(&x.arb->bus.nodes, 31); /* it had 0x21 */
+    pdcp_tables_remove(&x.arb->bus.tables, 31); /* it had 0x21 */
     exchange_rx(&x, "601#01 0200 0200 0200");
     exchange_tx(&x, "301#81 21 0200 0200 0200");
 }
@@ -218,7 +218,7 @@ static void test_all_places_are_free_at_the_start(void)
     for (unsigned id = 1; id <= PDCP_DEVICES_MAX; id++) {
         bind_and_beacon(id);
     }
-    TEST_ASSERT_EQUAL(PDCP_DEVICES_MAX, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(PDCP_DEVICES_MAX, pdcp_tables_count_devices(&x.arb->bus.tables));
 }
 
 static bool knows_one(void *ctx, const pdcp_identity_t *identity)
@@ -250,11 +250,11 @@ static void test_an_unknown_identity_that_is_not_there_is_forgotten(void)
     exchange_rx(&x, "620#01 3412 7856 BC9A");
     (void)exchange_drain(&x);
     exchange_pass(&x, 299);
-    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0x20]);
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.tables.owner[0x20]);
     exchange_pass(&x, 1);
     (void)exchange_drain(&x);
-    TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x20]);
-    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0x70]);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.tables.owner[0x20]);
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.tables.owner[0x70]);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LOST));
     exchange_silence(&x);
 }
@@ -274,7 +274,7 @@ static void test_an_identity_is_remembered_when_it_is_set_up(void)
 
 static void test_without_a_node_id_it_is_refused(void)
 {
-    memset(&x.arb->bus.nodes.owner[1], 0x80 | 40, 254);
+    memset(&x.arb->bus.tables.owner[1], 0x80 | 40, 254);
     exchange_rx(&x, "6C0#01 0900 0900 0900");
     exchange_tx(&x, "3C0#81 00 0900 0900 0900");
 }
@@ -291,7 +291,7 @@ static void test_a_second_device_with_the_same_identity_is_refused(void)
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_BIND_DUPLICATE));
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_DUPLICATE));
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, x.arb->bus.tables.devices[0].state);
 }
 
 /* D-BUS-6, D-BUS-41: two tries without an answer mean that it was reset: granted again and set up afresh. */
@@ -308,7 +308,7 @@ static void test_a_device_that_was_reset_is_granted_again(void)
     exchange_pass(&x, 1);
     exchange_tx(&x, "311#81 11 0200 0200 0400");
     exchange_tx(&x, "311#03 01 00");
-    TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, x.arb->bus.tables.devices[0].state);
     TEST_ASSERT_EQUAL(
         1, exchange_count(&x, PDCP_EVENT_LOST)); /* the host sees it go, and come with its beacon */
     exchange_rx(&x, "011#0A");
@@ -342,7 +342,7 @@ static void test_any_frame_from_its_id_answers_for_a_device(void)
         exchange_silence(&x);
     }
     TEST_ASSERT_EQUAL(4, stat_of(PDCP_STAT_BIND_DUPLICATE));
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, x.arb->bus.tables.devices[0].state);
 }
 
 /* D-BUS-41: a host's frame that no device need answer shows nothing; the identity is asked all the same. */
@@ -387,8 +387,8 @@ static void test_what_is_no_bind_request_is_counted(void)
     exchange_rx(&x, "711#01 0200 0200 0400"); /* P=3 M=1 [PDCP figure 2.3] */
     TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_DROP_UNUSED_ID));
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_devices(&x.arb->bus.nodes));
-    TEST_ASSERT_EQUAL(PDCP_NODE_FREE, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_devices(&x.arb->bus.tables));
+    TEST_ASSERT_EQUAL(PDCP_PLACE_FREE, x.arb->bus.tables.devices[0].state);
 }
 
 int main(void)

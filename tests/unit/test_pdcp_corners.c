@@ -168,26 +168,26 @@ static void add(unsigned id, unsigned serial, const char *channels, unsigned out
 }
 
 /* A device that answers Reset Device is lost at once. */
-static void lose(uint8_t node, unsigned id)
+static void lose(uint8_t place, unsigned id)
 {
-    TEST_ASSERT_TRUE(pdcp_arb_reset(x.arb, x.now_ms, node));
+    TEST_ASSERT_TRUE(pdcp_arb_reset(x.arb, x.now_ms, place));
     answered(id, "0B", "8B 01");
-    TEST_ASSERT_EQUAL(PDCP_NODE_LOST, x.arb->bus.nodes.nodes[node].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_LOST, x.arb->bus.tables.devices[place].state);
 }
 
 /* --- channels and links --- */
 
-static uint8_t number(uint8_t node, uint8_t index)
+static uint8_t number(uint8_t place, uint8_t index)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, node, index);
+    return pdcp_tables_channel(&x.arb->bus.tables, place, index);
 }
 
-static const pdcp_channel_t *channel(uint8_t node, uint8_t index)
+static const pdcp_channel_t *channel(uint8_t place, uint8_t index)
 {
-    return &x.arb->bus.nodes.channels[number(node, index)];
+    return &x.arb->bus.tables.channels[number(place, index)];
 }
 
-static void wish(uint8_t out_node, uint8_t in_node)
+static void ask_link(uint8_t out_node, uint8_t in_node)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, number(out_node, 1), number(in_node, 1)));
 }
@@ -223,7 +223,7 @@ static void add_two(void)
 static void add_two_linked(void)
 {
     add_two();
-    wish(0, 1);
+    ask_link(0, 1);
     link_input(0x12, 4, 0x11, 0xFE);
     wrote(0x11, 4, 1, "01");
     exchange_silence(&x);
@@ -244,8 +244,8 @@ static void update(unsigned id, const char *vid_pid, const char *sn_index)
 static void in_use(unsigned first, unsigned last)
 {
     for (unsigned id = first; id <= last; id++) {
-        if (x.arb->bus.nodes.owner[id] == 0) {
-            x.arb->bus.nodes.owner[id] = 0x80u | 40u;
+        if (x.arb->bus.tables.owner[id] == 0) {
+            x.arb->bus.tables.owner[id] = 0x80u | 40u;
         }
     }
 }
@@ -320,7 +320,7 @@ static void test_an_output_does_not_get_a_reserved_id(void)
     in_use(PDCP_NODE_MIN, 0xFD);
     asks_for(0x20, 5);
     is_told(0x20, 0xFE, 5);
-    x.arb->bus.nodes.owner[0xFD] = 0;
+    x.arb->bus.tables.owner[0xFD] = 0;
     exchange_pass(&x, 100); /* the setup's question once more */
     set_up(0x11, 4, "o", 0xFD);
     asks_for(0xFE, 5);
@@ -335,7 +335,7 @@ static void test_an_output_gets_a_remembered_id_last(void)
     in_use(0x21, PDCP_NODE_MAX);
     in_use(PDCP_NODE_MIN, 0x10);
     add(0x11, 4, "o", 0x20);
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, x.arb->bus.tables.devices[0].state);
 }
 
 static void test_without_a_node_id_for_its_output_a_setup_fails(void)
@@ -348,7 +348,7 @@ static void test_without_a_node_id_for_its_output_a_setup_fails(void)
     read(0x11, 9, 1, NULL);
     read(0x11, 10, 1, NULL);
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_NODE_FAILED, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_FAILED, x.arb->bus.tables.devices[0].state);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_NO_ROOM]);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SETUP_FAILED));
 }
@@ -366,7 +366,7 @@ static void test_more_required_channels_than_there_is_room_for(void)
     set_up_device(0x11, 4, 40);
     set_up_directions(0x11, channels);
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_NODE_FAILED, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_FAILED, x.arb->bus.tables.devices[0].state);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_NO_ROOM]);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SETUP_FAILED));
     add(0x12, 6, "o", 0xFE); /* others are set up all the same */
@@ -377,7 +377,7 @@ static void refuses_five_times(void)
     for (int i = 0; i < 5; i++) {
         answered(0x11, "03 01 00", "83 00 01 00");
         exchange_silence(&x);
-        TEST_ASSERT_EQUAL(i < 4 ? PDCP_NODE_SETUP : PDCP_NODE_FAILED, x.arb->bus.nodes.nodes[0].state);
+        TEST_ASSERT_EQUAL(i < 4 ? PDCP_PLACE_SETUP : PDCP_PLACE_FAILED, x.arb->bus.tables.devices[0].state);
         if (i < 4) {
             exchange_pass(&x, 250);
         }
@@ -399,7 +399,7 @@ static void test_a_setup_that_keeps_failing_is_reported_once(void)
         }
     }
     set_up(0x11, 4, "o", 0xFE);
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, x.arb->bus.tables.devices[0].state);
 }
 
 /* pdcp-bus.md 4: a value may be longer than its field; here type and profile in two packets. */
@@ -414,8 +414,8 @@ static void test_a_long_number_comes_by_bulk(void)
     answered(0x11, "8E 01", "0E 01 BBBB");
     to(0x11, "8E 01");
     to(0x11, "03 0B 00");
-    TEST_ASSERT_EQUAL_HEX16(0x1234, x.arb->bus.nodes.nodes[0].type);
-    TEST_ASSERT_EQUAL_HEX16(0x5678, x.arb->bus.nodes.nodes[0].profile);
+    TEST_ASSERT_EQUAL_HEX16(0x1234, x.arb->bus.tables.devices[0].type);
+    TEST_ASSERT_EQUAL_HEX16(0x5678, x.arb->bus.tables.devices[0].profile);
 }
 
 /* D-BUS-6, D-BUS-23: the identity asks again in the middle of a transfer; its end is the answer that shows
@@ -438,7 +438,7 @@ static void test_a_transfer_answers_for_its_device(void)
     to(0x11, "03 0A 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_BIND_DUPLICATE]);
-    TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, x.arb->bus.tables.devices[0].state);
 }
 
 /* --- requests of the host --- */
@@ -535,11 +535,11 @@ static void test_only_an_accepted_interval_of_the_device_counts(void)
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_set(x.arb, 0, 0, 10, bytes, 2));
     refused(0x11, 10, 0, "6400");
     TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_REQUEST)->status);
-    TEST_ASSERT_EQUAL(500, x.arb->bus.nodes.nodes[0].beacon_ms);
+    TEST_ASSERT_EQUAL(500, x.arb->bus.tables.devices[0].beacon_ms);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_set(x.arb, 0, 1, 10, bytes, 2));
     wrote(0x11, 10, 1, "6400");
     TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_REQUEST)->status);
-    TEST_ASSERT_EQUAL(500, x.arb->bus.nodes.nodes[0].beacon_ms);
+    TEST_ASSERT_EQUAL(500, x.arb->bus.tables.devices[0].beacon_ms);
 }
 
 /* pdcp-bus.md 2: response code 2 to 04 as well: use bulk transfer, however short the value. */
@@ -620,13 +620,13 @@ static void test_a_reset_that_finds_no_room_is_not_counted_as_sent(void)
     exchange_pass(&x, 1200);
     fill_queue();
     beacon(0x42);
-    TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_STRANGER_RESET]);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_UNKNOWN_RESET]);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_TX_FULL]);
     (void)exchange_drain(&x);
     exchange_pass(&x, 1000);
     beacon(0x42);
     to(0x42, "0B");
-    TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_STRANGER_RESET]);
+    TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_UNKNOWN_RESET]);
 }
 
 static void test_what_is_for_all_needs_room_and_an_arbitrator_that_speaks(void)
@@ -648,19 +648,19 @@ static void test_going_silent_ends_a_devices_link_without_a_word(void)
     to(0x12, "03 05 01");
     exchange_rx(&x, "100#0A");
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SILENT));
-    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_WISH));
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
     exchange_silence(&x);
 }
 
-static void test_going_silent_ends_a_wish_that_has_not_begun(void)
+static void test_going_silent_ends_a_request_that_has_not_begun(void)
 {
     add_two();
     exchange_meet_rival(&x);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
-    wish(0, 1);
+    ask_link(0, 1);
     exchange_rx(&x, "100#0A");
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     exchange_silence(&x);
 }
 
@@ -678,9 +678,9 @@ static void test_what_else_cannot_be_a_link(void)
     exchange_silence(&x);
 }
 
-static void remove_link(uint8_t node, unsigned id)
+static void remove_link(uint8_t place, unsigned id)
 {
-    pdcp_link_remove(&x.arb->bus, number(node, 1));
+    pdcp_link_remove(&x.arb->bus, number(place, 1));
     wrote(id, 4, 1, "00");
     wrote(id, 7, 1, "00 00");
     wrote(id, 8, 1, "0000 0000");
@@ -693,7 +693,7 @@ static void test_an_output_goes_on_while_somebody_listens(void)
 {
     add_two_linked();
     add(0x13, 9, "i", 0);
-    wish(0, 2);
+    ask_link(0, 2);
     link_input(0x13, 4, 0x11, 0xFE);
     exchange_silence(&x); /* enabled already */
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(2, 1)->link);
@@ -710,13 +710,13 @@ static void test_an_output_goes_on_while_somebody_listens(void)
 static void test_an_undo_that_is_refused_goes_on(void)
 {
     add_two();
-    wish(0, 1);
+    ask_link(0, 1);
     wrote(0x12, 5, 1, "0200 0200");
     refused(0x12, 6, 1, "0400 01");
     refused(0x12, 6, 1, "FFFF FF");
     wrote(0x12, 5, 1, "FFFF FFFF");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
 /* A second listener that refuses is none of the first one's business. */
@@ -724,11 +724,11 @@ static void test_a_refused_second_listener_leaves_the_first(void)
 {
     add_two_linked();
     add(0x13, 9, "i", 0);
-    wish(0, 2);
+    ask_link(0, 2);
     refused(0x13, 5, 1, "0200 0200");
     wrote(0x13, 5, 1, "FFFF FFFF");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(1, 1)->link);
     TEST_ASSERT_TRUE(channel(0, 1)->enabled);
 }
@@ -742,9 +742,9 @@ static void test_no_link_with_a_device_in_its_setup(void)
     exchange_check_fails(&x, "12");
     is_told(0x12, 0x12, 6);
     to(0x12, "03 01 00");
-    wish(0, 1);
+    ask_link(0, 1);
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     asks_for(0x11, 4);
     to(0x11, "03 01 00");
     exchange_pass(&x, 99);
@@ -758,10 +758,10 @@ static void test_no_link_with_a_device_in_its_setup(void)
     exchange_pass(&x, 2);
     is_told(0x11, 0x11, 4);
     to(0x11, "03 01 00");
-    wish(0, 2);
+    ask_link(0, 2);
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
-    TEST_ASSERT_EQUAL(2, exchange_count(&x, PDCP_EVENT_WISH));
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
+    TEST_ASSERT_EQUAL(2, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
     TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_LINK_FAILED]); /* not even begun */
 }
 
@@ -784,14 +784,14 @@ static void agree(uint8_t *output_enabled, uint8_t *input_enabled)
     }
 }
 
-/* The wish has failed: device 12h is to hear 11h again, in the end. */
+/* The link request has failed: device 12h is to hear 11h again, in the end. */
 static void old_link_comes_back(void)
 {
     uint8_t output_enabled = 1;
     uint8_t input_enabled = 0;
     agree(&output_enabled, &input_enabled);
-    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_WISH)->status);
-    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
+    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
     TEST_ASSERT_EQUAL(1, output_enabled);
     TEST_ASSERT_EQUAL(1, input_enabled);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(1, 1)->link);
@@ -804,7 +804,7 @@ static void test_a_source_that_could_not_be_replaced_comes_back(void)
 {
     add_two_linked();
     add(0x13, 9, "o", 0xFD);
-    wish(2, 1);
+    ask_link(2, 1);
     wrote(0x12, 4, 1, "00");
     wrote(0x12, 5, 1, "0200 0200");
     refused(0x12, 6, 1, "0900 01");
@@ -819,51 +819,51 @@ static void test_an_input_that_stays_enabled_keeps_its_source(void)
 {
     add_two_linked();
     add(0x13, 9, "o", 0xFD);
-    wish(2, 1);
+    ask_link(2, 1);
     refused(0x12, 4, 1, "00");
     old_link_comes_back();
 }
 
-static void test_an_output_lost_before_its_turn_ends_the_wish(void)
+static void test_an_output_lost_before_its_turn_ends_the_request(void)
 {
     add_two();
     add(0x13, 9, "o", 0xFD);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
-    wish(2, 1);
+    ask_link(2, 1);
     lose(2, 0x13);
     from(0x12, "83 01 05 01 FFFF FFFF");
     read(0x12, 6, 1, "FFFF FF");
     to(0x12, "8F 00 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
-static void test_an_input_lost_before_its_turn_ends_the_wish(void)
+static void test_an_input_lost_before_its_turn_ends_the_request(void)
 {
     add_two();
     add(0x13, 9, "i", 0);
     from(0x12, "0F 01");
     to(0x12, "03 05 01");
-    wish(0, 2);
+    ask_link(0, 2);
     lose(2, 0x13);
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     from(0x12, "83 01 05 01 FFFF FFFF");
     read(0x12, 6, 1, "FFFF FF");
     to(0x12, "8F 00 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
 }
 
-/* D-BUS-14: at once; what the host wishes comes behind it. */
-static void test_silencing_comes_before_a_wish(void)
+/* D-BUS-14: at once; what the host asks for comes behind it. */
+static void test_silencing_comes_before_a_request(void)
 {
     add_two_linked();
     add(0x13, 9, "i", 0);
     add(0x14, 10, "o", 0xFD);
     from(0x13, "0F 01");
     to(0x13, "03 05 01");
-    wish(3, 2);
+    ask_link(3, 2);
     lose(0, 0x11);
     from(0x13, "83 01 05 01 FFFF FFFF");
     answered(0x13, "03 06 01", "83 01 06 01 FFFF FF");
@@ -875,7 +875,7 @@ static void test_silencing_comes_before_a_wish(void)
     wrote(0x14, 4, 1, "01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, channel(2, 1)->link);
-    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
 /* The same before what a device has asked for. */
@@ -883,7 +883,7 @@ static void test_silencing_comes_before_an_update(void)
 {
     add_two();
     add(0x13, 9, "i", 0);
-    wish(0, 2);
+    ask_link(0, 2);
     link_input(0x13, 4, 0x11, 0xFE);
     wrote(0x11, 4, 1, "01");
     add(0x14, 10, "i", 0);
@@ -1013,7 +1013,7 @@ static void test_a_refused_link_waits(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, channel(1, 1)->link);
     add(0x13, 9, "o", 0xFD);
     exchange_silence(&x);
-    wish(2, 1); /* the host wants another source; the first one's output was never enabled */
+    ask_link(2, 1); /* the host wants another source; the first one's output was never enabled */
     link_input(0x12, 9, 0x13, 0xFD);
     wrote(0x13, 4, 1, "01");
     exchange_silence(&x);
@@ -1030,7 +1030,7 @@ static void test_an_input_waits_for_its_source(void)
     wrote(0x12, 7, 1, "00 00");
     lose(1, 0x12);
     add(0x12, 6, "i", 0);
-    add(0x13, 9, "o", 0xFD); /* a stranger to it */
+    add(0x13, 9, "o", 0xFD); /* an unknown device to it */
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, channel(1, 1)->link);
     add(0x11, 4, "o", 0xFE);
@@ -1063,7 +1063,7 @@ static void test_a_source_that_comes_and_goes(void)
 {
     add_two_linked();
     add(0x13, 9, "i", 0);
-    wish(0, 2);
+    ask_link(0, 2);
     link_input(0x13, 4, 0x11, 0xFE);
     lose(0, 0x11);
     for (unsigned id = 0x12; id <= 0x13; id++) {
@@ -1109,7 +1109,7 @@ static void test_a_link_outlives_a_failed_setup(void)
         to(0x12, "03 01 00");
     }
     from(0x12, "83 00 01 00");
-    TEST_ASSERT_EQUAL(PDCP_NODE_FAILED, x.arb->bus.nodes.nodes[1].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_FAILED, x.arb->bus.tables.devices[1].state);
     add(0x13, 9, "o", 0xFD);
     exchange_silence(&x);
     beacon(0x11);
@@ -1149,7 +1149,7 @@ int main(void)
     RUN_TEST(test_a_reset_that_finds_no_room_is_not_counted_as_sent);
     RUN_TEST(test_what_is_for_all_needs_room_and_an_arbitrator_that_speaks);
     RUN_TEST(test_going_silent_ends_a_devices_link_without_a_word);
-    RUN_TEST(test_going_silent_ends_a_wish_that_has_not_begun);
+    RUN_TEST(test_going_silent_ends_a_request_that_has_not_begun);
     RUN_TEST(test_what_else_cannot_be_a_link);
     RUN_TEST(test_an_output_goes_on_while_somebody_listens);
     RUN_TEST(test_an_undo_that_is_refused_goes_on);
@@ -1157,9 +1157,9 @@ int main(void)
     RUN_TEST(test_no_link_with_a_device_in_its_setup);
     RUN_TEST(test_a_source_that_could_not_be_replaced_comes_back);
     RUN_TEST(test_an_input_that_stays_enabled_keeps_its_source);
-    RUN_TEST(test_an_output_lost_before_its_turn_ends_the_wish);
-    RUN_TEST(test_an_input_lost_before_its_turn_ends_the_wish);
-    RUN_TEST(test_silencing_comes_before_a_wish);
+    RUN_TEST(test_an_output_lost_before_its_turn_ends_the_request);
+    RUN_TEST(test_an_input_lost_before_its_turn_ends_the_request);
+    RUN_TEST(test_silencing_comes_before_a_request);
     RUN_TEST(test_silencing_comes_before_an_update);
     RUN_TEST(test_a_source_in_its_setup_is_not_there_yet);
     RUN_TEST(test_sources_that_cannot_be);

@@ -50,12 +50,12 @@ static uint32_t classified(void)
 /* Sum over all tables but for the times of the last frames: these are all that a frame may change unasked. */
 static uint32_t tables(void)
 {
-    const uint16_t *words = (const uint16_t *)&x.arb->bus.nodes; /* it begins with one */
+    const uint16_t *words = (const uint16_t *)&x.arb->bus.tables; /* it begins with one */
     uint32_t sum = 0;
     for (unsigned i = 0; i < PDCP_DEVICES_MAX; i++) {
-        x.arb->bus.nodes.nodes[i].heard_ms = 0;
+        x.arb->bus.tables.devices[i].heard_ms = 0;
     }
-    for (unsigned i = 0; i < sizeof x.arb->bus.nodes / sizeof words[0]; i++) {
+    for (unsigned i = 0; i < sizeof x.arb->bus.tables / sizeof words[0]; i++) {
         sum += words[i] * (2u * i + 1u); /* a word that changes changes the sum */
     }
     return sum;
@@ -77,7 +77,7 @@ static void offer(uint16_t id, uint8_t code, uint8_t dlc)
     (void)pdcp_arb_on_frame(x.arb, x.now_ms, &frame);
     TEST_ASSERT_EQUAL_UINT32(rx + 1, stat_of(PDCP_STAT_RX));
     TEST_ASSERT_EQUAL_UINT32(sum + 1, classified());
-    x.arb->bus.txq.count = 0; /* a failure answer, a Reset for a stranger */
+    x.arb->bus.txq.count = 0; /* a failure answer, a Reset for an unknown device */
 }
 
 /* Devices: 11h and 12h ready and linked, 13h lost and kept, 14h in its setup, 15h failed, FEh an output, all
@@ -86,12 +86,12 @@ static void fill_bus(void)
 {
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
-    pdcp_channel_t *input = &x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)];
+    pdcp_channel_t *input = &x.arb->bus.tables.channels[pdcp_tables_channel(&x.arb->bus.tables, 1, 1)];
     input->link = PDCP_LINK_ACTIVE;
-    input->source.feed = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    input->source.channel = pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
     input->enabled = true;
-    x.arb->bus.nodes.channels[input->source.feed].enabled =
-        true; /* else a stranger would take its id (D-BUS-36) */
+    x.arb->bus.tables.channels[input->source.channel].enabled =
+        true; /* else an unknown device would take its id (D-BUS-36) */
     exchange_rx(&x, "613#01 0300 0300 0300");
     exchange_rx(&x, "013#0A");
     exchange_rx(&x, "614#01 0400 0400 0400");
@@ -100,10 +100,10 @@ static void fill_bus(void)
     exchange_rx(&x, "015#0A");
     (void)exchange_drain(&x);
     pdcp_request_cancel(&x.arb->bus, 2);
-    x.arb->bus.nodes.nodes[2].state = PDCP_NODE_LOST;
-    x.arb->bus.nodes.nodes[2].beaconed = false;
+    x.arb->bus.tables.devices[2].state = PDCP_PLACE_LOST;
+    x.arb->bus.tables.devices[2].beaconed = false;
     pdcp_request_cancel(&x.arb->bus, 4);
-    x.arb->bus.nodes.nodes[4].state = PDCP_NODE_FAILED;
+    x.arb->bus.tables.devices[4].state = PDCP_PLACE_FAILED;
     x.now_ms += 1200;
 }
 
@@ -120,7 +120,8 @@ static void test_every_frame_is_classified_and_changes_nothing(void)
                     offer(id, (uint8_t)code, dlc);
                 }
             }
-            /* 0F of what is no input is answered; of the input 1 it would be a wish: its channel here is 0 */
+            /* 0F of what is no input is answered; of the input 1 it would be a link request: its channel here
+             * is 0 */
             TEST_ASSERT_EQUAL_HEX32(before, tables());
         }
     }
@@ -182,7 +183,7 @@ static void enter_state(pdcp_request_state_t state)
         break;
     }
     (void)exchange_drain(&x);
-    TEST_ASSERT_EQUAL(state, bus->nodes.nodes[0].request.state);
+    TEST_ASSERT_EQUAL(state, bus->tables.devices[0].request.state);
 }
 
 /* What may follow in which state: next state, or that the request ends (IDLE). Rows: events below. */
@@ -230,7 +231,7 @@ static void test_the_request_machine_over_all_states_and_events(void)
             (void)snprintf(name, sizeof name, "state %u, event %s", state,
                            machine[e].event != NULL ? machine[e].event : "deadline");
             enter_state((pdcp_request_state_t)state);
-            const pdcp_request_t *request = &x.arb->bus.nodes.nodes[0].request;
+            const pdcp_request_t *request = &x.arb->bus.tables.devices[0].request;
             if (machine[e].event != NULL) {
                 exchange_rx(&x, machine[e].event);
             } else {
@@ -340,9 +341,9 @@ static void serve_devices(devices_t *devices, uint32_t ms)
 
 static void expect_outcome(const devices_t *devices, uint8_t output, uint8_t input, const char *name)
 {
-    const pdcp_channel_t *channels = x.arb->bus.nodes.channels;
-    const int8_t status = exchange_last(&x, PDCP_EVENT_WISH)->status;
-    TEST_ASSERT_EQUAL_MESSAGE(1, exchange_count(&x, PDCP_EVENT_WISH), name);
+    const pdcp_channel_t *channels = x.arb->bus.tables.channels;
+    const int8_t status = exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status;
+    TEST_ASSERT_EQUAL_MESSAGE(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST), name);
     if (status != PDCP_OK) {
         TEST_ASSERT_NOT_EQUAL_MESSAGE(PDCP_LINK_ACTIVE, channels[input].link, name);
     } else {
@@ -369,8 +370,8 @@ static void test_a_link_job_with_every_outcome_at_every_step(void)
             exchange_add_output(&x, "FE");
             exchange_add_input(&x);
             exchange_clear(&x);
-            const uint8_t output = pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
-            const uint8_t input = pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+            const uint8_t output = pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
+            const uint8_t input = pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
             TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output, input));
             devices_t devices = {.failing = failing, .fail = (fail_t)fail, .alive = {true, true}};
             serve_devices(&devices, 2900);

@@ -15,17 +15,17 @@ void tearDown(void) {}
 
 static uint8_t output(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
 }
 
 static uint8_t input(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
 }
 
 static const pdcp_channel_t *the_input(void)
 {
-    return &x.arb->bus.nodes.channels[input()];
+    return &x.arb->bus.tables.channels[input()];
 }
 
 /* pdcp-bus.md 8: 5, 6, 8, 7 and enabled to the input, then enabled to the output. */
@@ -57,8 +57,8 @@ static void test_a_link_is_made_in_order(void)
     }
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_WISH)->status);
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
 /* D-API-6: repeated, it succeeds without traffic. */
@@ -68,8 +68,8 @@ static void test_the_same_link_again_costs_nothing(void)
     exchange_clear(&x);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
-    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
+    TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
 static void test_what_cannot_be_a_link(void)
@@ -108,16 +108,16 @@ static void fail_at(int step)
     exchange_rx(&x, refusals[step]);
     for (int i = step; i >= 0; i--) {
         exchange_tx(&x, undoing[i].tx);
-        TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_WISH));
+        TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
         exchange_rx(&x, undoing[i].rx);
     }
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
     TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, the_input()->source.index);
     TEST_ASSERT_FALSE(the_input()->enabled);
-    TEST_ASSERT_FALSE(x.arb->bus.nodes.channels[output()].enabled);
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_FALSE(x.arb->bus.tables.channels[output()].enabled);
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_LINK_FAILED]);
 }
 
@@ -171,7 +171,7 @@ static void test_silence_in_the_middle_ends_the_link(void)
     exchange_tx(&x, undoing[1].tx);
     exchange_pass(&x, 100);
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
 static void test_a_lost_answer_is_repeated_and_the_link_made(void)
@@ -201,7 +201,7 @@ static void test_a_link_is_removed(void)
     TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
     exchange_run(&x, removing);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
 /* D-BUS-14: the source is lost: inactive at once, transfer enabled 0, node ids 0 0; 5, 6 and 8 stay. */
@@ -219,7 +219,7 @@ static void test_a_lost_source_is_silenced(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
     exchange_run(&x, silencing);
     TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes)); /* inactive links count */
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables)); /* inactive links count */
 }
 
 /* An input that does not answer goes on being told, until it does. */
@@ -295,8 +295,8 @@ static void test_a_returning_source_gets_its_links_back(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
 }
 
-/* D-BUS-14: the source is away for longer than its ids are kept; a stranger that gets them is not heard, and
- * the link is remembered by identity. */
+/* D-BUS-14: the source is away for longer than its ids are kept; an unknown device that gets them is not
+ * heard, and the link is remembered by identity. */
 static void test_a_link_outlives_the_ids_of_its_source(void)
 {
     static const exchange_pair_t silencing[] = {
@@ -322,9 +322,9 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
         }
         exchange_silence(&x);
     }
-    TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.tables.owner[0x11]);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->source.feed);
+    TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->source.channel);
     exchange_add_output(&x, "FD"); /* a freed id is given out last (D-BUS-36) */
     exchange_run(&x, making_again);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
@@ -372,7 +372,7 @@ static void test_update_data_channel_waits_for_its_source(void)
     exchange_tx(&x, "312#8F 00 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 
     static const exchange_pair_t pairs[] = {
         {"313#81 13 0300 0300 0900", NULL},
@@ -443,11 +443,12 @@ static void test_a_source_is_replaced(void)
     make_link();
     exchange_rx(&x, "613#01 0300 0300 0900");
     exchange_run(&x, binding);
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK,
+                      pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), input()));
     exchange_run(&x, replacing);
     TEST_ASSERT_EQUAL(9, the_input()->source.identity.sn);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
 /* The source is lost in the middle of making a link. */
@@ -520,7 +521,7 @@ static void link_second_input(void)
     exchange_run(&x, binding);
     exchange_rx(&x, "013#0A");
     TEST_ASSERT_EQUAL(PDCP_OK,
-                      pdcp_arb_connect(x.arb, output(), pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)));
+                      pdcp_arb_connect(x.arb, output(), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
     exchange_run(&x, linking);
 }
 
@@ -556,7 +557,7 @@ static void test_update_data_channel_does_not_keep_an_input_from_being_silenced(
     exchange_silence(&x);
     exchange_rx(&x, "212#84 01 04 01 00");
     exchange_run(&x, silencing);
-    TEST_ASSERT_FALSE(x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1)].enabled);
+    TEST_ASSERT_FALSE(x.arb->bus.tables.channels[pdcp_tables_channel(&x.arb->bus.tables, 2, 1)].enabled);
 }
 
 /* D-BUS-22: nor does it when the input does not answer: what breaks off the repetition is served, and then it
@@ -591,7 +592,7 @@ static void test_update_data_channel_does_not_end_the_silencing(void)
  * silenced. */
 static void test_a_link_whose_source_has_gone_is_not_made(void)
 {
-    pdcp_channel_t *channel = &x.arb->bus.nodes.channels[input()];
+    pdcp_channel_t *channel = &x.arb->bus.tables.channels[input()];
     channel->link = PDCP_LINK_INACTIVE;
     channel->enabled = true;
     pdcp_ends_note(&x.arb->bus, input(), PDCP_TODO_CONNECT);

@@ -15,12 +15,12 @@ void tearDown(void) {}
 
 static uint8_t output(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
 }
 
 static uint8_t input(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
 }
 
 static const exchange_pair_t to_the_input[] = {
@@ -40,7 +40,7 @@ static void make_link(void)
 {
     connect_to_the_last_step();
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.nodes.channels[input()].link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[input()].link);
 }
 
 /* The input's device is reset while the output's answer is awaited: there is no link, and the output is told
@@ -60,11 +60,11 @@ static void test_the_input_vanishes_at_the_last_step(void)
     exchange_tx(&x, "312#81 12 0200 0200 0600");
     exchange_tx(&x, "312#03 01 00");
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.nodes.channels[input()].link);
+    TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[input()].link);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
 /* An output that may be on, because its answers were lost, is written again by the next link. */
@@ -96,9 +96,9 @@ static void test_an_output_in_doubt_is_written_again(void)
     exchange_tx(&x, "311#04 04 01 01");
 }
 
-/* A wish that waits behind a job ends when one of its devices is reset: its channels may be others' before
- * its turn. */
-static void test_a_waiting_wish_ends_with_its_device(void)
+/* A link request that waits behind a job ends when one of its devices is reset: its channels may be others'
+ * before its turn. */
+static void test_a_waiting_request_ends_with_its_device(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
     exchange_tx(&x, to_the_input[0].tx);
@@ -109,23 +109,23 @@ static void test_a_waiting_wish_ends_with_its_device(void)
     exchange_tx(&x, "311#03 01 00");
     exchange_tx(&x, "312#04 05 01 0200 0200"); /* the job's second try */
     exchange_pass(&x, 100);
-    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_WISH));
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
-/* D-API-10: a wish that cannot be started within 1 s. */
-static void test_a_wish_does_not_wait_for_ever(void)
+/* D-API-10: a link request that cannot be started within 1 s. */
+static void test_a_request_does_not_wait_for_ever(void)
 {
-    x.arb->bus.nodes.nodes[1].ack_ms = 500;
+    x.arb->bus.tables.devices[1].ack_ms = 500;
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
     exchange_tx(&x, to_the_input[0].tx); /* never answered: 1.5 s */
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
     exchange_step(&x);
     exchange_pass(&x, 999);
     exchange_beacons(&x);
-    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_WISH));
+    TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
     exchange_pass(&x, 1);
-    TEST_ASSERT_EQUAL(PDCP_ERR_BUSY, exchange_last(&x, PDCP_EVENT_WISH)->status);
+    TEST_ASSERT_EQUAL(PDCP_ERR_BUSY, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
 }
 
 static void let_weeks_go_by(void)
@@ -179,7 +179,7 @@ static void test_every_unknown_id_is_told_once_a_second(void)
         }
         exchange_wait(&x, 99);
     }
-    TEST_ASSERT_EQUAL(0xE0 - 0x20, x.arb->bus.stats[PDCP_STAT_STRANGER_RESET]);
+    TEST_ASSERT_EQUAL(0xE0 - 0x20, x.arb->bus.stats[PDCP_STAT_UNKNOWN_RESET]);
     exchange_wait(&x, 200);
     (void)exchange_drain(&x);
     exchange_rx(&x, "042#0A");
@@ -209,7 +209,7 @@ static void test_an_update_for_an_output_during_its_setup(void)
     exchange_pairs(&x, before);
     exchange_rx(&x, "213#0F 01");
     exchange_run(&x, after);
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
 /* D-BUS-14: a device whose link is active names another, absent source: it must not go on hearing the old
@@ -230,7 +230,7 @@ static void test_an_update_to_an_absent_source_silences_the_input(void)
     exchange_tx(&x, "312#04 07 01 0000");
     exchange_rx(&x, "212#84 01 07 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, x.arb->bus.nodes.channels[input()].link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, x.arb->bus.tables.channels[input()].link);
 }
 
 /* D-BUS-19: when its source could not even be read, the device gets no answer and asks again. */
@@ -324,8 +324,8 @@ static const exchange_pair_t removing[] = {
 
 static void expect_no_link(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.nodes.channels[input()].link);
-    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, x.arb->bus.nodes.channels[input()].todo);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.tables.channels[input()].link);
+    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, x.arb->bus.tables.channels[input()].todo);
     TEST_ASSERT_TRUE(pdcp_arb_links_settled(x.arb));
 }
 
@@ -343,7 +343,8 @@ static void test_a_removal_outlasts_a_link_that_fails(void)
     make_link();
     exchange_rx(&x, "613#01 0300 0300 0900");
     exchange_run(&x, third);
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 2, 1), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK,
+                      pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), input()));
     exchange_tx(&x, "312#04 04 01 00");
     TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
     exchange_rx(&x, "212#84 00 04 01"); /* refused: the link that worked would be made anew */
@@ -416,8 +417,8 @@ int main(void)
     UNITY_BEGIN();
     RUN_TEST(test_the_input_vanishes_at_the_last_step);
     RUN_TEST(test_an_output_in_doubt_is_written_again);
-    RUN_TEST(test_a_waiting_wish_ends_with_its_device);
-    RUN_TEST(test_a_wish_does_not_wait_for_ever);
+    RUN_TEST(test_a_waiting_request_ends_with_its_device);
+    RUN_TEST(test_a_request_does_not_wait_for_ever);
     RUN_TEST(test_an_old_arbitrator_is_not_young_again);
     RUN_TEST(test_old_reservations_do_not_come_back);
     RUN_TEST(test_every_unknown_id_is_told_once_a_second);

@@ -19,9 +19,9 @@ static uint32_t stat_of(pdcp_stat_t stat)
     return x.arb->bus.stats[stat];
 }
 
-static const pdcp_node_t *node(void)
+static const pdcp_device_entry_t *node(void)
 {
-    return &x.arb->bus.nodes.nodes[0];
+    return &x.arb->bus.tables.devices[0];
 }
 
 static void bind_device(void)
@@ -54,43 +54,43 @@ static void test_everything_is_read_and_written_in_order(void)
     };
     bind_device();
     exchange_run(&x, pairs);
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, node()->state);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_READY));
     TEST_ASSERT_EQUAL_HEX16(0x1234, node()->type);
     TEST_ASSERT_EQUAL_HEX16(0x5678, node()->profile);
     TEST_ASSERT_EQUAL(50, node()->ack_ms);
     TEST_ASSERT_EQUAL(200, node()->beacon_ms);
 
-    const pdcp_nodes_t *nodes = &x.arb->bus.nodes;
-    const uint8_t first = pdcp_nodes_channel(nodes, 0, 1);
-    const uint8_t second = pdcp_nodes_channel(nodes, 0, 2);
-    const uint8_t third = pdcp_nodes_channel(nodes, 0, 3);
-    TEST_ASSERT_EQUAL_HEX16(0x7200, nodes->channels[first].type);
-    TEST_ASSERT_EQUAL_HEX16(0x2200, nodes->channels[first].profile);
-    TEST_ASSERT_EQUAL(PDCP_INPUT, nodes->channels[first].transfer);
-    TEST_ASSERT_EQUAL(1, nodes->channels[first].source.identity.vid);
-    TEST_ASSERT_EQUAL(3, nodes->channels[first].source.identity.pid);
-    TEST_ASSERT_EQUAL(7, nodes->channels[first].source.identity.sn);
-    TEST_ASSERT_EQUAL(2, nodes->channels[first].source.index);
-    TEST_ASSERT_EQUAL_HEX16(0x5000, nodes->channels[first].source.type);
-    TEST_ASSERT_EQUAL_HEX16(0x2120, nodes->channels[first].source.profile);
-    TEST_ASSERT_EQUAL_HEX16(0x1110, nodes->channels[first].terminal_profile);
-    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, nodes->channels[second].source.index); /* D-BUS-7 */
-    TEST_ASSERT_EQUAL(PDCP_OUTPUT, nodes->channels[third].transfer);
-    TEST_ASSERT_EQUAL(0xFE, nodes->channels[third].node_id);
+    const pdcp_tables_t *tables = &x.arb->bus.tables;
+    const uint8_t first = pdcp_tables_channel(tables, 0, 1);
+    const uint8_t second = pdcp_tables_channel(tables, 0, 2);
+    const uint8_t third = pdcp_tables_channel(tables, 0, 3);
+    TEST_ASSERT_EQUAL_HEX16(0x7200, tables->channels[first].type);
+    TEST_ASSERT_EQUAL_HEX16(0x2200, tables->channels[first].profile);
+    TEST_ASSERT_EQUAL(PDCP_INPUT, tables->channels[first].transfer);
+    TEST_ASSERT_EQUAL(1, tables->channels[first].source.identity.vid);
+    TEST_ASSERT_EQUAL(3, tables->channels[first].source.identity.pid);
+    TEST_ASSERT_EQUAL(7, tables->channels[first].source.identity.sn);
+    TEST_ASSERT_EQUAL(2, tables->channels[first].source.index);
+    TEST_ASSERT_EQUAL_HEX16(0x5000, tables->channels[first].source.type);
+    TEST_ASSERT_EQUAL_HEX16(0x2120, tables->channels[first].source.profile);
+    TEST_ASSERT_EQUAL_HEX16(0x1110, tables->channels[first].terminal_profile);
+    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, tables->channels[second].source.index); /* D-BUS-7 */
+    TEST_ASSERT_EQUAL(PDCP_OUTPUT, tables->channels[third].transfer);
+    TEST_ASSERT_EQUAL(0xFE, tables->channels[third].node_id);
 
     /* D-BUS-8: bit 7 of the first byte is channel index 0; D-BUS-13: only bits of inputs that exist are
      * kept. */
-    TEST_ASSERT_TRUE(pdcp_nodes_needs(nodes, first, false, 2));
-    TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, first, false, 1));
-    TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, first, true, 2));
-    TEST_ASSERT_TRUE(pdcp_nodes_needs(nodes, second, true, 1));
-    TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, second, false, 1));
-    TEST_ASSERT_TRUE(pdcp_nodes_needs(nodes, third, false, 1));
-    TEST_ASSERT_TRUE(pdcp_nodes_needs(nodes, third, false, 2));
-    TEST_ASSERT_TRUE(pdcp_nodes_needs(nodes, third, true, 1));
-    TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, third, true, 3)); /* an output */
-    TEST_ASSERT_FALSE(pdcp_nodes_needs(nodes, third, true, 7)); /* does not exist */
+    TEST_ASSERT_TRUE(pdcp_tables_needs(tables, first, false, 2));
+    TEST_ASSERT_FALSE(pdcp_tables_needs(tables, first, false, 1));
+    TEST_ASSERT_FALSE(pdcp_tables_needs(tables, first, true, 2));
+    TEST_ASSERT_TRUE(pdcp_tables_needs(tables, second, true, 1));
+    TEST_ASSERT_FALSE(pdcp_tables_needs(tables, second, false, 1));
+    TEST_ASSERT_TRUE(pdcp_tables_needs(tables, third, false, 1));
+    TEST_ASSERT_TRUE(pdcp_tables_needs(tables, third, false, 2));
+    TEST_ASSERT_TRUE(pdcp_tables_needs(tables, third, true, 1));
+    TEST_ASSERT_FALSE(pdcp_tables_needs(tables, third, true, 3)); /* an output */
+    TEST_ASSERT_FALSE(pdcp_tables_needs(tables, third, true, 7)); /* does not exist */
 }
 
 /* pdcp-bus.md 6: only 1 and 9 of the device and 1 and 3 of a channel are mandatory; D-BUS-13: defaults. */
@@ -107,7 +107,7 @@ static void test_unsupported_parameters_get_defaults(void)
     };
     bind_device();
     exchange_run(&x, pairs);
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, node()->state);
     TEST_ASSERT_EQUAL(100, node()->ack_ms);
     TEST_ASSERT_EQUAL(500, node()->beacon_ms);
 }
@@ -155,7 +155,7 @@ static void test_a_silent_device_is_tried_and_then_left(void)
         }
         exchange_pass(&x, 99);
         exchange_rx(&x, "011#0A"); /* it lives, it only does not answer */
-        TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, node()->state);
+        TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, node()->state);
         exchange_pass(&x, 1);
         exchange_silence(&x);
         if (attempt < 4) {
@@ -164,11 +164,11 @@ static void test_a_silent_device_is_tried_and_then_left(void)
             exchange_pass(&x, 1);
         }
     }
-    TEST_ASSERT_EQUAL(PDCP_NODE_FAILED, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_FAILED, node()->state);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_SETUP_FAILED));
     TEST_ASSERT_EQUAL(5, stat_of(PDCP_STAT_NO_ANSWER));
     TEST_ASSERT_EQUAL(10, stat_of(PDCP_STAT_REPEATS));
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_devices(&x.arb->bus.nodes)); /* bound */
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_devices(&x.arb->bus.tables)); /* bound */
 }
 
 static void test_a_mandatory_parameter_that_is_refused_ends_the_attempt(void)
@@ -189,7 +189,7 @@ static void test_another_identity_than_the_bound_one_fails(void)
     exchange_rx(&x, "211#83 01 01 00 0200 0300");
     exchange_tx(&x, "311#0B"); /* two devices have this id: both bind again (D-BUS-54) */
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_NODE_LOST, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_LOST, node()->state);
     exchange_rx(&x, "611#01 0200 0200 0500");
     exchange_tx(&x, "311#81 11 0200 0200 0500");
     exchange_tx(&x, "311#03 01 00");
@@ -210,7 +210,7 @@ static void test_a_direction_that_does_not_exist_fails(void)
     };
     bind_device();
     exchange_run(&x, pairs);
-    TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, node()->state);
     exchange_pass(&x, 250);
     exchange_tx(&x, "311#03 03 01"); /* the same step again (D-BUS-17) */
     exchange_rx(&x, "211#83 01 03 01 02");
@@ -285,8 +285,8 @@ static void test_a_silent_device_holds_nobody_up(void)
     bind_device();
     exchange_tx(&x, "311#03 01 00"); /* never answered */
     exchange_add_input(&x);
-    TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, x.arb->bus.nodes.nodes[0].state);
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, x.arb->bus.nodes.nodes[1].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, x.arb->bus.tables.devices[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, x.arb->bus.tables.devices[1].state);
 }
 
 /* Bit strings of more than 4 bytes come by bulk transfer: 83 with code 2, 0C, 8C with the size, packets
@@ -322,8 +322,8 @@ static void test_required_channels_by_bulk(void)
     exchange_rx(&x, "211#83 00 0A 01");
     exchange_tx(&x, "311#03 0B 01");
     exchange_rx(&x, "211#83 00 0B 01");
-    TEST_ASSERT_EQUAL(PDCP_NODE_READY, node()->state);
-    TEST_ASSERT_TRUE(pdcp_nodes_needs(&x.arb->bus.nodes, node()->first_channel, false, 1));
+    TEST_ASSERT_EQUAL(PDCP_PLACE_READY, node()->state);
+    TEST_ASSERT_TRUE(pdcp_tables_needs(&x.arb->bus.tables, node()->first_channel, false, 1));
 }
 
 static void test_more_channels_than_there_is_room_for(void)
@@ -340,7 +340,7 @@ static void test_more_channels_than_there_is_room_for(void)
     bind_device();
     exchange_run(&x, pairs);
     TEST_ASSERT_EQUAL(1, stat_of(PDCP_STAT_NO_ROOM));
-    TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, node()->state);
     TEST_ASSERT_EQUAL(0, node()->channel_count);
 }
 
@@ -352,15 +352,15 @@ static void test_a_device_is_lost_and_later_forgotten(void)
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LOST));
     exchange_pass(&x, 1);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LOST));
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_devices(&x.arb->bus.nodes));
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_channels(&x.arb->bus.nodes, PDCP_OUTPUT));
-    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
-    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0xFE]);
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_devices(&x.arb->bus.tables));
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_channels(&x.arb->bus.tables, PDCP_OUTPUT));
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.tables.owner[0x11]);
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.tables.owner[0xFE]);
     exchange_pass(&x, 9999);
-    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
+    TEST_ASSERT_NOT_EQUAL(0, x.arb->bus.tables.owner[0x11]);
     exchange_pass(&x, 1);
-    TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0x11]);
-    TEST_ASSERT_EQUAL(0, x.arb->bus.nodes.owner[0xFE]);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.tables.owner[0x11]);
+    TEST_ASSERT_EQUAL(0, x.arb->bus.tables.owner[0xFE]);
 }
 
 /* A device with a beacon interval of 100 ms that stops right after its binding: gone after 300 ms, not
@@ -404,8 +404,8 @@ static void test_channel_data_counts_as_life(void)
 {
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1),
-                                                pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 0, 1),
+                                                pdcp_tables_channel(&x.arb->bus.tables, 1, 1)));
     exchange_run(&x, exchange_making);
     for (int i = 0; i < 4; i++) {
         exchange_pass(&x, 1000);
@@ -416,9 +416,9 @@ static void test_channel_data_counts_as_life(void)
     TEST_ASSERT_EQUAL(4, stat_of(PDCP_STAT_CHANNEL_DATA));
 }
 
-/* D-BUS-36: on the id of an output that is not enabled speaks a stranger, 100 ms after its disabling was
- * answered: that is no life of the owner. */
-static void test_data_of_an_output_that_is_silent_is_a_strangers(void)
+/* D-BUS-36: on the id of an output that is not enabled speaks an unknown device, 100 ms after its disabling
+ * was answered: that is no life of the owner. */
+static void test_data_of_an_output_that_is_silent_is_an_unknown_devices(void)
 {
     exchange_add_output(&x, "FE");
     exchange_pass(&x, 99);
@@ -436,7 +436,7 @@ static void test_data_of_an_output_that_is_silent_is_a_strangers(void)
 
 /* D-BUS-15: a beacon from an id that is not bound gets Reset Device, at most once a second, not in the first
  * 1200 ms. */
-static void test_a_stranger_is_told_to_reset(void)
+static void test_an_unknown_device_is_told_to_reset(void)
 {
     exchange_pass(&x, 1199 - PDCP_CLOSED_MS);
     exchange_rx(&x, "042#0A");
@@ -456,7 +456,7 @@ static void test_a_stranger_is_told_to_reset(void)
     exchange_rx(&x, "000#0A");    /* no device has these ids */
     exchange_rx(&x, "0FF#0A");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(3, stat_of(PDCP_STAT_STRANGER_RESET));
+    TEST_ASSERT_EQUAL(3, stat_of(PDCP_STAT_UNKNOWN_RESET));
 }
 
 /* D-BUS-15: from an id that is kept for a lost device: it is read who it is, and it is set up without a
@@ -469,7 +469,7 @@ static void test_a_lost_device_that_beacons_is_taken_back(void)
     exchange_tx(&x, "311#03 01 00");
     exchange_rx(&x, "211#83 01 01 00 0200 0200");
     exchange_tx(&x, "311#03 02 00");
-    TEST_ASSERT_EQUAL(PDCP_NODE_SETUP, node()->state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_SETUP, node()->state);
 }
 
 /* D-BUS-11 */
@@ -527,8 +527,8 @@ int main(void)
     RUN_TEST(test_a_short_beacon_interval_counts_at_once);
     RUN_TEST(test_a_beacon_interval_written_by_the_host_counts);
     RUN_TEST(test_channel_data_counts_as_life);
-    RUN_TEST(test_data_of_an_output_that_is_silent_is_a_strangers);
-    RUN_TEST(test_a_stranger_is_told_to_reset);
+    RUN_TEST(test_data_of_an_output_that_is_silent_is_an_unknown_devices);
+    RUN_TEST(test_an_unknown_device_is_told_to_reset);
     RUN_TEST(test_a_lost_device_that_beacons_is_taken_back);
     RUN_TEST(test_the_arbitrator_beacons_every_500_ms);
     RUN_TEST(test_the_next_deadline_is_known);

@@ -15,12 +15,12 @@ void tearDown(void) {}
 
 static uint8_t input(void)
 {
-    return pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1);
+    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
 }
 
 static const pdcp_channel_t *the_input(void)
 {
-    return &x.arb->bus.nodes.channels[input()];
+    return &x.arb->bus.tables.channels[input()];
 }
 
 /* The source is lost: the link is inactive, the input silenced; 5, 6 and 8 stay. */

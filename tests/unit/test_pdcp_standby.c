@@ -99,7 +99,7 @@ static void test_a_question_for_an_identity_is_no_service(void)
 }
 
 /* D-BUS-35: silence of the other for 1600 ms and the spread by serial number: it takes over, and keeps quiet
- * towards strangers for 1200 ms. */
+ * towards unknown devices for 1200 ms. */
 static void test_the_standby_takes_over(void)
 {
     exchange_meet_server(&x);
@@ -141,13 +141,13 @@ static void test_going_silent_ends_what_the_host_waits_for(void)
     exchange_meet_rival(&x);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_get(x.arb, 0, 0, 8, bytes, sizeof bytes));
     exchange_tx(&x, "311#03 08 00");
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1),
-                                                pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 0, 1),
+                                                pdcp_tables_channel(&x.arb->bus.tables, 1, 1)));
     exchange_tx(&x, "312#04 05 01 0200 0200");
     exchange_rx(&x, "100#0A");
     TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_REQUEST)->status);
-    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_WISH)->status);
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_devices(&x.arb->bus.tables));
     exchange_silence(&x);
 }
 
@@ -193,18 +193,19 @@ static void test_devices_are_reset_side_by_side(void)
     exchange_tx(&x, "311#0B");
     exchange_tx(&x, "312#0B");
     exchange_rx(&x, "212#8B 01");
-    TEST_ASSERT_EQUAL(1, exchange_last(&x, PDCP_EVENT_RESET)->node);
+    TEST_ASSERT_EQUAL(1, exchange_last(&x, PDCP_EVENT_RESET)->place);
     TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_RESET)->status);
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_devices(&x.arb->bus.tables));
     exchange_pass(&x, 100);
     exchange_tx(&x, "311#0B");
     exchange_pass(&x, 100);
     exchange_tx(&x, "311#0B");
     exchange_pass(&x, 100);
-    TEST_ASSERT_EQUAL(0, exchange_last(&x, PDCP_EVENT_RESET)->node);
+    TEST_ASSERT_EQUAL(0, exchange_last(&x, PDCP_EVENT_RESET)->place);
     TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_RESET)->status);
     TEST_ASSERT_EQUAL(2, exchange_count(&x, PDCP_EVENT_RESET));
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_devices(&x.arb->bus.nodes)); /* it still beacons for all we know */
+    TEST_ASSERT_EQUAL(1,
+                      pdcp_tables_count_devices(&x.arb->bus.tables)); /* it still beacons for all we know */
     exchange_rx(&x, "612#01 0200 0200 0600");
     exchange_tx(&x, "312#81 12 0200 0200 0600");
 }
@@ -216,12 +217,12 @@ static void test_a_reset_that_is_refused(void)
     exchange_tx(&x, "311#0B");
     exchange_rx(&x, "211#8B 00");
     TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_RESET)->status);
-    TEST_ASSERT_EQUAL(1, pdcp_nodes_count_devices(&x.arb->bus.nodes));
+    TEST_ASSERT_EQUAL(1, pdcp_tables_count_devices(&x.arb->bus.tables));
 }
 
 /* D-BUS-15: the id is kept for a lost device, but another one beacons with it: it is told to reset, at most
  * once a second. */
-static void test_a_stranger_with_a_kept_id_is_told_to_reset(void)
+static void test_an_unknown_device_with_a_kept_id_is_told_to_reset(void)
 {
     exchange_add_output(&x, "FE");
     exchange_pass(&x, 1500);
@@ -230,7 +231,7 @@ static void test_a_stranger_with_a_kept_id_is_told_to_reset(void)
     exchange_rx(&x, "211#83 01 01 00 0900 0900");
     exchange_tx(&x, "311#0B");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_NODE_LOST, x.arb->bus.nodes.nodes[0].state);
+    TEST_ASSERT_EQUAL(PDCP_PLACE_LOST, x.arb->bus.tables.devices[0].state);
     exchange_pass(&x, 500);
     exchange_rx(&x, "011#0A");
     exchange_tx(&x, "311#03 01 00");
@@ -264,7 +265,7 @@ static void test_a_link_that_was_not_answered_is_tried_again(void)
     exchange_pass(&x, 1);
     exchange_run(&x, exchange_making);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE,
-                      x.arb->bus.nodes.channels[pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)].link);
+                      x.arb->bus.tables.channels[pdcp_tables_channel(&x.arb->bus.tables, 1, 1)].link);
 }
 
 /* Bus-off: restarted after 100 ms, doubling to 5 s; what waited is discarded and counted. */
@@ -356,8 +357,8 @@ static void test_a_full_queue_delays_nothing_urgent(void)
     while (pdcp_txq_put(&x.arb->bus.txq, &filler) == PDCP_TXQ_TAKEN) {
     }
     exchange_wait(&x, 500);
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_nodes_channel(&x.arb->bus.nodes, 0, 1),
-                                                pdcp_nodes_channel(&x.arb->bus.nodes, 1, 1)));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 0, 1),
+                                                pdcp_tables_channel(&x.arb->bus.tables, 1, 1)));
     exchange_tx(&x, "100#0A");
     exchange_tx(&x, "312#04 05 01 0200 0200");
     exchange_tx(&x, "5FF#00");
@@ -379,7 +380,7 @@ int main(void)
     RUN_TEST(test_all_are_suspended_and_released);
     RUN_TEST(test_devices_are_reset_side_by_side);
     RUN_TEST(test_a_reset_that_is_refused);
-    RUN_TEST(test_a_stranger_with_a_kept_id_is_told_to_reset);
+    RUN_TEST(test_an_unknown_device_with_a_kept_id_is_told_to_reset);
     RUN_TEST(test_a_link_that_was_not_answered_is_tried_again);
     RUN_TEST(test_bus_off_is_left_with_a_growing_pause);
     RUN_TEST(test_a_bus_that_was_well_for_long_starts_from_100_ms);

@@ -208,12 +208,13 @@ static void test_ends_are_looked_up_in_the_tables(void)
     systems_add(&s, "D1 out 1 5000 2110; D2 in 1 5000 2110, out 2 5000 2110");
     systems_configure(&s, "1.1>2.1", false);
     const profile_entry_t *entry = &s.links.entries[0];
-    TEST_ASSERT_EQUAL_UINT8(systems_place(&s, 1), profile_links_place(&s.links, &s.nodes, &entry->output));
+    TEST_ASSERT_EQUAL_UINT8(systems_place(&s, 1), profile_links_place(&s.links, &s.tables, &entry->output));
     TEST_ASSERT_EQUAL_UINT8(systems_channel(&s, "1.1"),
-                            profile_links_channel(&s.links, &s.nodes, &entry->output, PDCP_OUTPUT));
-    TEST_ASSERT_EQUAL_UINT8(PDCP_NONE, profile_links_channel(&s.links, &s.nodes, &entry->output, PDCP_INPUT));
-    TEST_ASSERT_EQUAL_UINT8(0, profile_links_of(&s.links, &s.nodes, systems_channel(&s, "2.1")));
-    TEST_ASSERT_EQUAL_UINT8(PDCP_NONE, profile_links_of(&s.links, &s.nodes, systems_channel(&s, "2.2")));
+                            profile_links_channel(&s.links, &s.tables, &entry->output, PDCP_OUTPUT));
+    TEST_ASSERT_EQUAL_UINT8(PDCP_NONE,
+                            profile_links_channel(&s.links, &s.tables, &entry->output, PDCP_INPUT));
+    TEST_ASSERT_EQUAL_UINT8(0, profile_links_of(&s.links, &s.tables, systems_channel(&s, "2.1")));
+    TEST_ASSERT_EQUAL_UINT8(PDCP_NONE, profile_links_of(&s.links, &s.tables, systems_channel(&s, "2.2")));
 }
 
 static void test_an_end_is_missing_when_its_device_is_not_set_up(void)
@@ -222,25 +223,25 @@ static void test_an_end_is_missing_when_its_device_is_not_set_up(void)
     systems_configure(&s, "1.1>2.1", false);
     const profile_entry_t *entry = &s.links.entries[0];
     systems_lose(&s, systems_place(&s, 1));
-    TEST_ASSERT_NOT_EQUAL(PDCP_NONE, profile_links_place(&s.links, &s.nodes, &entry->output));
+    TEST_ASSERT_NOT_EQUAL(PDCP_NONE, profile_links_place(&s.links, &s.tables, &entry->output));
     TEST_ASSERT_EQUAL_UINT8(PDCP_NONE,
-                            profile_links_channel(&s.links, &s.nodes, &entry->output, PDCP_OUTPUT));
+                            profile_links_channel(&s.links, &s.tables, &entry->output, PDCP_OUTPUT));
     systems_forget(&s, systems_place(&s, 1));
-    TEST_ASSERT_EQUAL_UINT8(PDCP_NONE, profile_links_place(&s.links, &s.nodes, &entry->output));
+    TEST_ASSERT_EQUAL_UINT8(PDCP_NONE, profile_links_place(&s.links, &s.tables, &entry->output));
     TEST_ASSERT_EQUAL_UINT8(PDCP_NONE,
-                            profile_links_channel(&s.links, &s.nodes, &entry->output, PDCP_OUTPUT));
+                            profile_links_channel(&s.links, &s.tables, &entry->output, PDCP_OUTPUT));
     systems_add(&s, "D1 in 1 5000 2110"); /* it has become an input */
     TEST_ASSERT_EQUAL_UINT8(PDCP_NONE,
-                            profile_links_channel(&s.links, &s.nodes, &entry->output, PDCP_OUTPUT));
+                            profile_links_channel(&s.links, &s.tables, &entry->output, PDCP_OUTPUT));
 }
 
 static void test_a_channel_as_an_end(void)
 {
     profile_end_t end;
     systems_add(&s, "D1 2:3:4 out 1 5000 2110, out 2 7000 2120");
-    s.nodes.nodes[systems_place(&s, 1)].type = 0x0A0B;
-    s.nodes.nodes[systems_place(&s, 1)].profile = 0x4004;
-    profile_channel_end(&s.nodes, systems_channel(&s, "1.2"), &end);
+    s.tables.devices[systems_place(&s, 1)].type = 0x0A0B;
+    s.tables.devices[systems_place(&s, 1)].profile = 0x4004;
+    profile_channel_end(&s.tables, systems_channel(&s, "1.2"), &end);
     const profile_end_t expected = {{2, 3, 4}, 0x0A0B, 0x4004, 0x7000, 0x2120, 2};
     check_end(&expected, &end);
 }
@@ -249,19 +250,19 @@ static void test_the_source_that_an_input_names(void)
 {
     profile_end_t end;
     systems_add(&s, "D1 2:3:4 out 1 5000 2110; D2 in 1 5000 2110, in 2 5000 2110, in 3 5000 2110");
-    s.nodes.nodes[systems_place(&s, 1)].type = 0x0A0B;
+    s.tables.devices[systems_place(&s, 1)].type = 0x0A0B;
     systems_link(&s, "1.1>2.1");
-    TEST_ASSERT_TRUE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.1"), &end));
+    TEST_ASSERT_TRUE(profile_channel_named_source(&s.tables, systems_channel(&s, "2.1"), &end));
     const profile_end_t here = {{2, 3, 4}, 0x0A0B, 0, 0x5000, 0x2110, 1};
     check_end(&here, &end);
     systems_forget(&s, systems_place(&s, 1));
-    TEST_ASSERT_TRUE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.1"), &end));
+    TEST_ASSERT_TRUE(profile_channel_named_source(&s.tables, systems_channel(&s, "2.1"), &end));
     const profile_end_t gone = {{2, 3, 4}, 0, 0, 0x5000, 0x2110, 1};
     check_end(&gone, &end);
     TEST_ASSERT_FALSE(
-        profile_channel_named_source(&s.nodes, systems_channel(&s, "2.2"), &end)); /* index FFh (D-BUS-7) */
-    s.nodes.channels[systems_channel(&s, "2.3")].source.index = 0;
-    TEST_ASSERT_FALSE(profile_channel_named_source(&s.nodes, systems_channel(&s, "2.3"), &end));
+        profile_channel_named_source(&s.tables, systems_channel(&s, "2.2"), &end)); /* index FFh (D-BUS-7) */
+    s.tables.channels[systems_channel(&s, "2.3")].source.index = 0;
+    TEST_ASSERT_FALSE(profile_channel_named_source(&s.tables, systems_channel(&s, "2.3"), &end));
 }
 
 int main(void)

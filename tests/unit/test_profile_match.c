@@ -72,7 +72,8 @@ static void test_flags_of_the_type(void)
     static const bool sole[] = {true, false, true, false, false};
     static const bool terminal[] = {false, true, true, false, false};
     for (uint8_t i = 0; i < 5; i++) {
-        const pdcp_channel_t *channel = &s.nodes.channels[pdcp_nodes_channel(&s.nodes, 0, (uint8_t)(i + 1))];
+        const pdcp_channel_t *channel =
+            &s.tables.channels[pdcp_tables_channel(&s.tables, 0, (uint8_t)(i + 1))];
         TEST_ASSERT_EQUAL(sole[i], profile_channel_is_sole(channel));
         TEST_ASSERT_EQUAL(terminal[i], profile_channel_is_terminal(channel));
     }
@@ -81,17 +82,17 @@ static void test_flags_of_the_type(void)
 static void test_the_terminal_profile_is_the_priority(void)
 {
     systems_add(&s, "D1 in 1 5300 2110 for 1220, in 2 5300 2110");
-    TEST_ASSERT_EQUAL_HEX16(0x1220, profile_channel_priority(&s.nodes.channels[systems_channel(&s, "1.1")]));
-    TEST_ASSERT_EQUAL_HEX16(0x2110, profile_channel_priority(&s.nodes.channels[systems_channel(&s, "1.2")]));
+    TEST_ASSERT_EQUAL_HEX16(0x1220, profile_channel_priority(&s.tables.channels[systems_channel(&s, "1.1")]));
+    TEST_ASSERT_EQUAL_HEX16(0x2110, profile_channel_priority(&s.tables.channels[systems_channel(&s, "1.2")]));
 }
 
 static void check_before(const char *first, const char *second)
 {
     const uint8_t a = systems_channel(&s, first);
     const uint8_t b = systems_channel(&s, second);
-    TEST_ASSERT_TRUE_MESSAGE(profile_match_is_before(&s.nodes, a, b), first);
-    TEST_ASSERT_FALSE_MESSAGE(profile_match_is_before(&s.nodes, b, a), second);
-    TEST_ASSERT_FALSE_MESSAGE(profile_match_is_before(&s.nodes, a, a), first);
+    TEST_ASSERT_TRUE_MESSAGE(profile_match_is_before(&s.tables, a, b), first);
+    TEST_ASSERT_FALSE_MESSAGE(profile_match_is_before(&s.tables, b, a), second);
+    TEST_ASSERT_FALSE_MESSAGE(profile_match_is_before(&s.tables, a, a), first);
 }
 
 /* D-PRO-3: profile, then VID, PID, SN, index; each decides over all that come behind it. */
@@ -131,15 +132,15 @@ static void test_only_channels_of_devices_that_are_set_up_are_ready(void)
     systems_add(&s, "D1 in 1 5000 2110, out 2 5000 2110");
     const uint8_t in = systems_channel(&s, "1.1");
     const uint8_t out = systems_channel(&s, "1.2");
-    TEST_ASSERT_TRUE(profile_channel_is_ready(&s.nodes, in, PDCP_INPUT));
-    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, in, PDCP_OUTPUT));
-    TEST_ASSERT_TRUE(profile_channel_is_ready(&s.nodes, out, PDCP_OUTPUT));
-    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, PDCP_NONE, PDCP_INPUT));
-    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, PDCP_CHANNELS_MAX - 1, PDCP_INPUT));
-    static const uint8_t states[] = {PDCP_NODE_SETUP, PDCP_NODE_FAILED, PDCP_NODE_LOST};
+    TEST_ASSERT_TRUE(profile_channel_is_ready(&s.tables, in, PDCP_INPUT));
+    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.tables, in, PDCP_OUTPUT));
+    TEST_ASSERT_TRUE(profile_channel_is_ready(&s.tables, out, PDCP_OUTPUT));
+    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.tables, PDCP_NONE, PDCP_INPUT));
+    TEST_ASSERT_FALSE(profile_channel_is_ready(&s.tables, PDCP_CHANNELS_MAX - 1, PDCP_INPUT));
+    static const uint8_t states[] = {PDCP_PLACE_SETUP, PDCP_PLACE_FAILED, PDCP_PLACE_LOST};
     for (unsigned i = 0; i < sizeof states; i++) {
-        s.nodes.nodes[0].state = states[i];
-        TEST_ASSERT_FALSE(profile_channel_is_ready(&s.nodes, in, PDCP_INPUT));
+        s.tables.devices[0].state = states[i];
+        TEST_ASSERT_FALSE(profile_channel_is_ready(&s.tables, in, PDCP_INPUT));
     }
 }
 

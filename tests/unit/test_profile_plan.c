@@ -172,13 +172,13 @@ static void read_back(void)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         profile_link_t link;
-        if (profile_channel_is_ready(&s.nodes, i, PDCP_INPUT) &&
-            profile_channel_named_source(&s.nodes, i, &link.output)) {
-            profile_channel_end(&s.nodes, i, &link.input);
+        if (profile_channel_is_ready(&s.tables, i, PDCP_INPUT) &&
+            profile_channel_named_source(&s.tables, i, &link.output)) {
+            profile_channel_end(&s.tables, i, &link.input);
             TEST_ASSERT_TRUE(profile_links_put(&s.links, &link, false));
         }
-        s.nodes.channels[i].link = PDCP_LINK_NONE;
-        s.nodes.channels[i].source.feed = PDCP_NONE;
+        s.tables.channels[i].link = PDCP_LINK_NONE;
+        s.tables.channels[i].source.channel = PDCP_NONE;
     }
 }
 
@@ -396,7 +396,7 @@ static void test_a_banned_pair_leads_to_the_next_candidate(void)
 {
     systems_add(&s, "D1 out 1 5000 1110, out 2 5000 1120, out 3 5000 1200; D2 in 1 5300 1110");
     expect("1.1>2.1");
-    s.nodes.channels[systems_channel(&s, "2.1")].link = PDCP_LINK_NONE;
+    s.tables.channels[systems_channel(&s, "2.1")].link = PDCP_LINK_NONE;
     profile_links_init(&s.links);
     ban("1.1", "2.1");
     systems_plan(&s, ALL);
@@ -644,7 +644,7 @@ static void test_links_rest_while_what_they_require_is_missing(void)
     run("D1 out 1 5000 1110 req 2, in 2 5200 2110; D2 in 1 5300 1110; D3 out 1 5000 2110", "3.1>1.2 1.1>2.1");
     lose(3);
     expect("");
-    TEST_ASSERT_EQUAL_UINT8(PDCP_LINK_INACTIVE, s.nodes.channels[systems_channel(&s, "2.1")].link);
+    TEST_ASSERT_EQUAL_UINT8(PDCP_LINK_INACTIVE, s.tables.channels[systems_channel(&s, "2.1")].link);
     systems_add(&s, "D4 out 1 5000 2200");
     expect("4.1>1.2 1.1>2.1");
 }
@@ -772,12 +772,12 @@ static void test_a_device_that_is_being_set_up_is_awaited(void)
 {
     set_up("D1 out 1 5000 2110; D2 in 1 5300 2110; D3 out 1 5000 2120", "1.1>2.1");
     const profile_scene_t scene = systems_scene(&s);
-    pdcp_node_t *node = &s.nodes.nodes[systems_place(&s, 1)];
+    pdcp_device_entry_t *device = &s.tables.devices[systems_place(&s, 1)];
     TEST_ASSERT_FALSE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
-    node->state = PDCP_NODE_SETUP;
+    device->state = PDCP_PLACE_SETUP;
     TEST_ASSERT_TRUE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
     expect("");
-    node->setup_again = true; /* it has failed before (D-BUS-17) */
+    device->setup_again = true; /* it has failed before (D-BUS-17) */
     TEST_ASSERT_FALSE(profile_scene_is_awaited(&scene, &s.links.entries[0].output));
     expect("3.1>2.1");
     forget(1);
@@ -842,13 +842,13 @@ static void test_a_second_sole_access_input_breaks_sole_access(void)
     systems_add(&s, "D1 out 1 5000 2110, out 2 5000 2110; D2 in 1 5200 2110, in 2 5200 2110, in 3 5000 2110");
     const uint8_t output = systems_channel(&s, "1.1");
     systems_link(&s, "1.1>2.1 1.2>2.3");
-    TEST_ASSERT_TRUE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.2")));
-    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.1")));
-    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.3")));
-    TEST_ASSERT_FALSE(
-        profile_channel_breaks_sole_access(&s.nodes, systems_channel(&s, "1.2"), systems_channel(&s, "2.2")));
-    s.nodes.channels[systems_channel(&s, "2.1")].link = PDCP_LINK_INACTIVE;
-    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.nodes, output, systems_channel(&s, "2.2")));
+    TEST_ASSERT_TRUE(profile_channel_breaks_sole_access(&s.tables, output, systems_channel(&s, "2.2")));
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.tables, output, systems_channel(&s, "2.1")));
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.tables, output, systems_channel(&s, "2.3")));
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.tables, systems_channel(&s, "1.2"),
+                                                         systems_channel(&s, "2.2")));
+    s.tables.channels[systems_channel(&s, "2.1")].link = PDCP_LINK_INACTIVE;
+    TEST_ASSERT_FALSE(profile_channel_breaks_sole_access(&s.tables, output, systems_channel(&s, "2.2")));
 }
 
 /* --- Growth --- */

@@ -173,7 +173,7 @@ static void make_limb(uint32_t seed, uint8_t devices, uint8_t channels, uint8_t 
 
 static uint8_t place_of(uint8_t device)
 {
-    return pdcp_nodes_find(&s.nodes, &limb.devices[device].identity);
+    return pdcp_tables_find(&s.tables, &limb.devices[device].identity);
 }
 
 static void come(uint8_t device)
@@ -209,7 +209,7 @@ static void come_mixed(uint32_t absent)
         for (uint8_t d = limb.count; d > 0; d--) {
             const uint8_t place = place_of((uint8_t)(d - 1));
             if (place != PDCP_NONE && turn <= limb.devices[d - 1].count) {
-                (void)pdcp_nodes_set_channels(&s.nodes, place, turn);
+                (void)pdcp_tables_set_channels(&s.tables, place, turn);
             }
         }
     }
@@ -244,14 +244,14 @@ static void configure(bool backwards)
 
 static const systems_channel_t *spec(uint8_t channel)
 {
-    const pdcp_channel_t *entry = &s.nodes.channels[channel];
-    return &limb.devices[spec_of[entry->node]].channels[entry->index - 1];
+    const pdcp_channel_t *entry = &s.tables.channels[channel];
+    return &limb.devices[spec_of[entry->place]].channels[entry->index - 1];
 }
 
 static bool is_there(uint8_t channel, uint8_t transfer)
 {
-    const uint8_t node = channel != PDCP_NONE ? s.nodes.channels[channel].node : PDCP_NONE;
-    return node != PDCP_NONE && s.nodes.nodes[node].state == PDCP_NODE_READY &&
+    const uint8_t place = channel != PDCP_NONE ? s.tables.channels[channel].place : PDCP_NONE;
+    return place != PDCP_NONE && s.tables.devices[place].state == PDCP_PLACE_READY &&
            spec(channel)->transfer == transfer;
 }
 
@@ -289,9 +289,9 @@ static bool is_like(uint8_t channel, const profile_ref_t *end)
 static uint8_t end_channel(const profile_ref_t *end, const uint8_t *channels)
 {
     for (; *channels != PDCP_NONE; channels++) {
-        const pdcp_channel_t *channel = &s.nodes.channels[*channels];
-        if (channel->index == end->index &&
-            pdcp_identity_equal(&s.nodes.nodes[channel->node].identity, &s.links.parts[end->part].identity)) {
+        const pdcp_channel_t *channel = &s.tables.channels[*channels];
+        if (channel->index == end->index && pdcp_identity_equal(&s.tables.devices[channel->place].identity,
+                                                                &s.links.parts[end->part].identity)) {
             return *channels;
         }
     }
@@ -333,8 +333,8 @@ static bool misses(const uint8_t *links, uint8_t channel, uint8_t input)
     const uint32_t required = spec(channel)->required;
     for (const uint8_t *c = inputs; required != 0 && *c != PDCP_NONE; c++) {
         if (*c != input && links[*c] == PDCP_NONE &&
-            s.nodes.channels[*c].node == s.nodes.channels[channel].node &&
-            (required & (uint32_t)1 << s.nodes.channels[*c].index) != 0) {
+            s.tables.channels[*c].place == s.tables.channels[channel].place &&
+            (required & (uint32_t)1 << s.tables.channels[*c].index) != 0) {
             return true;
         }
     }
@@ -355,7 +355,7 @@ static void check_links(void)
             continue;
         }
         check(is_there(i, PDCP_INPUT) && is_there(o, PDCP_OUTPUT), "an end is missing");
-        check(s.nodes.channels[i].node != s.nodes.channels[o].node, "a device feeds itself");
+        check(s.tables.channels[i].place != s.tables.channels[o].place, "a device feeds itself");
         check(!is_sole(i) || rival_of(want, o, i) == PDCP_NONE, "sole access is broken");
         const bool left_alone = is_original(o, i) && s.links.entries[entry_of(i)].by_host;
         check(left_alone || !lacks(want, o, i), "a required input is not connected");
@@ -491,7 +491,8 @@ static void check_kept(void)
 /* Could this link be made as it is, without anything else? */
 static bool is_possible(uint8_t output, uint8_t input)
 {
-    if (s.plan.want[input] != PDCP_NONE || s.nodes.channels[output].node == s.nodes.channels[input].node ||
+    if (s.plan.want[input] != PDCP_NONE ||
+        s.tables.channels[output].place == s.tables.channels[input].place ||
         (is_sole(input) && rival_of(s.plan.want, output, input) != PDCP_NONE)) {
         return false;
     }
@@ -518,8 +519,8 @@ static void check_originals(void)
 static bool is_awaited(const profile_ref_t *end)
 {
     for (uint8_t p = 0; p < PDCP_DEVICES_MAX; p++) {
-        if (s.nodes.nodes[p].state == PDCP_NODE_LOST && (s.awaited[p / 8] & (1u << (p % 8))) != 0 &&
-            pdcp_identity_equal(&s.nodes.nodes[p].identity, &s.links.parts[end->part].identity)) {
+        if (s.tables.devices[p].state == PDCP_PLACE_LOST && (s.awaited[p / 8] & (1u << (p % 8))) != 0 &&
+            pdcp_identity_equal(&s.tables.devices[p].identity, &s.links.parts[end->part].identity)) {
             return true;
         }
     }
@@ -565,8 +566,8 @@ static uint32_t mix(uint32_t hash, uint32_t value)
 
 static uint32_t hash_channel(uint32_t hash, uint8_t channel)
 {
-    const pdcp_channel_t *entry = &s.nodes.channels[channel];
-    const pdcp_identity_t *owner = &s.nodes.nodes[entry->node].identity;
+    const pdcp_channel_t *entry = &s.tables.channels[channel];
+    const pdcp_identity_t *owner = &s.tables.devices[entry->place].identity;
     return mix(mix(mix(mix(hash, owner->vid), owner->pid), owner->sn), entry->index);
 }
 
@@ -606,8 +607,8 @@ static void look_back(void)
     list(outputs, PDCP_OUTPUT);
     memset(before, PDCP_NONE, sizeof before);
     for (const uint8_t *i = inputs; *i != PDCP_NONE; i++) {
-        if (s.nodes.channels[*i].link == PDCP_LINK_ACTIVE) {
-            before[*i] = s.nodes.channels[*i].source.feed;
+        if (s.tables.channels[*i].link == PDCP_LINK_ACTIVE) {
+            before[*i] = s.tables.channels[*i].source.channel;
         }
     }
     for (uint8_t e = 0; e < s.links.count; e++) {
@@ -665,7 +666,8 @@ static uint8_t any_channel(void)
 {
     const uint8_t device = (uint8_t)random_of(limb.count);
     const uint8_t index = (uint8_t)(1 + random_of(limb.devices[device].count));
-    return place_of(device) != PDCP_NONE ? pdcp_nodes_channel(&s.nodes, place_of(device), index) : PDCP_NONE;
+    return place_of(device) != PDCP_NONE ? pdcp_tables_channel(&s.tables, place_of(device), index)
+                                         : PDCP_NONE;
 }
 
 /* The host makes a link, which does not break sole access. */
@@ -675,11 +677,11 @@ static void link_by_host(void)
     const uint8_t output = any_channel();
     const uint8_t input = any_channel();
     if (is_there(output, PDCP_OUTPUT) && is_there(input, PDCP_INPUT) &&
-        s.nodes.channels[output].node != s.nodes.channels[input].node &&
-        !profile_channel_breaks_sole_access(&s.nodes, output, input)) {
+        s.tables.channels[output].place != s.tables.channels[input].place &&
+        !profile_channel_breaks_sole_access(&s.tables, output, input)) {
         systems_connect(&s, output, input);
-        profile_channel_end(&s.nodes, output, &link.output);
-        profile_channel_end(&s.nodes, input, &link.input);
+        profile_channel_end(&s.tables, output, &link.output);
+        profile_channel_end(&s.tables, input, &link.input);
         check(profile_links_put(&s.links, &link, true), "no room for the host's link");
     }
 }
@@ -693,7 +695,7 @@ static void happen(void)
     const uint8_t device = (uint8_t)random_of(limb.count);
     const uint8_t place = place_of(device);
     const bool forgets = chance(30);
-    if (place == PDCP_NONE || s.nodes.nodes[place].state != PDCP_NODE_READY) {
+    if (place == PDCP_NONE || s.tables.devices[place].state != PDCP_PLACE_READY) {
         come(device);
     } else if (forgets) {
         systems_forget(&s, place);
@@ -790,7 +792,7 @@ static void link_anything(void)
         const uint8_t output = any_channel();
         const uint8_t input = any_channel();
         if (is_there(output, PDCP_OUTPUT) && is_there(input, PDCP_INPUT) &&
-            s.nodes.channels[output].node != s.nodes.channels[input].node) {
+            s.tables.channels[output].place != s.tables.channels[input].place) {
             s.plan.want[input] = output;
         }
     }
@@ -800,10 +802,10 @@ static void link_anything(void)
 /* Is a before b by profile, VID, PID, SN, index? */
 static bool comes_first(uint8_t a, uint8_t b)
 {
-    const pdcp_channel_t *one = &s.nodes.channels[a];
-    const pdcp_channel_t *other = &s.nodes.channels[b];
-    const pdcp_identity_t *first = &s.nodes.nodes[one->node].identity;
-    const pdcp_identity_t *second = &s.nodes.nodes[other->node].identity;
+    const pdcp_channel_t *one = &s.tables.channels[a];
+    const pdcp_channel_t *other = &s.tables.channels[b];
+    const pdcp_identity_t *first = &s.tables.devices[one->place].identity;
+    const pdcp_identity_t *second = &s.tables.devices[other->place].identity;
     const uint16_t left[] = {one->profile, first->vid, first->pid, first->sn, one->index};
     const uint16_t right[] = {other->profile, second->vid, second->pid, second->sn, other->index};
     for (uint8_t i = 0; i < 5; i++) {
@@ -899,7 +901,7 @@ static bool can_complete(uint8_t *links);
 static bool can_connect(uint8_t *links, uint8_t input)
 {
     for (const uint8_t *o = outputs; *o != PDCP_NONE; o++) {
-        if (s.nodes.channels[*o].node != s.nodes.channels[input].node && are_alike(*o, input) &&
+        if (s.tables.channels[*o].place != s.tables.channels[input].place && are_alike(*o, input) &&
             !(is_sole(input) && rival_of(links, *o, input) != PDCP_NONE)) {
             links[input] = *o;
             if (can_complete(links)) {
@@ -916,11 +918,11 @@ static bool can_complete(uint8_t *links)
 {
     for (const uint8_t *i = inputs; *i != PDCP_NONE; i++) {
         for (const uint8_t *c = inputs; *c != PDCP_NONE && links[*i] != PDCP_NONE; c++) {
-            const uint32_t bit = (uint32_t)1 << s.nodes.channels[*c].index;
-            const uint8_t node = s.nodes.channels[*c].node;
+            const uint32_t bit = (uint32_t)1 << s.tables.channels[*c].index;
+            const uint8_t place = s.tables.channels[*c].place;
             const bool needed =
-                (s.nodes.channels[*i].node == node && (spec(*i)->required & bit) != 0) ||
-                (s.nodes.channels[links[*i]].node == node && (spec(links[*i])->required & bit) != 0);
+                (s.tables.channels[*i].place == place && (spec(*i)->required & bit) != 0) ||
+                (s.tables.channels[links[*i]].place == place && (spec(links[*i])->required & bit) != 0);
             if (needed && links[*c] == PDCP_NONE) {
                 return can_connect(links, *c);
             }

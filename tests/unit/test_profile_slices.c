@@ -36,7 +36,7 @@ void setUp(void)
         }
         systems_set_up(&s, systems_bind(&s, &device), &device);
     }
-    app.arb.bus.nodes = s.nodes;
+    app.arb.bus.tables = s.tables;
     app.limb.run.state = PROFILE_RUNNING;
     app.limb.run.at_events = PROFILE_PLAN_ALL;
 }
@@ -72,16 +72,16 @@ static void begin_plan(void)
     profile_run_begin(&app.limb.run, PROFILE_PLAN_ALL, true);
 }
 
-static void tell(pdcp_event_kind_t kind, uint8_t node)
+static void tell(pdcp_event_kind_t kind, uint8_t place)
 {
-    const pdcp_event_t event = {.kind = kind, .node = node, .channel = PDCP_NONE};
+    const pdcp_event_t event = {.kind = kind, .place = place, .channel = PDCP_NONE};
     profile_events_take(&app.limb.run, &app.arb, x.now_ms, &event);
 }
 
 /* The plan is the one that these tables give in one go. */
 static void expect_plan_of_the_tables(void)
 {
-    s.nodes = app.arb.bus.nodes;
+    s.tables = app.arb.bus.tables;
     systems_plan(&s, PROFILE_PLAN_ALL);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(s.plan.want, app.limb.run.plan.want, PDCP_CHANNELS_MAX);
 }
@@ -101,23 +101,23 @@ static void test_a_device_goes_between_two_slices(void)
     const uint8_t gone = 1;
     begin_plan();
     make_slices(8);
-    app.arb.bus.nodes.nodes[gone].state = PDCP_NODE_LOST;
+    app.arb.bus.tables.devices[gone].state = PDCP_PLACE_LOST;
     tell(PDCP_EVENT_LOST, gone);
     TEST_ASSERT_GREATER_THAN(8, finish_plan()); /* from the beginning */
     expect_plan_of_the_tables();
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const uint8_t output = app.limb.run.plan.want[i];
-        TEST_ASSERT_TRUE(output == PDCP_NONE || (app.arb.bus.nodes.channels[i].node != gone &&
-                                                 app.arb.bus.nodes.channels[output].node != gone));
+        TEST_ASSERT_TRUE(output == PDCP_NONE || (app.arb.bus.tables.channels[i].place != gone &&
+                                                 app.arb.bus.tables.channels[output].place != gone));
     }
 }
 
 static void test_a_device_comes_between_two_slices(void)
 {
-    app.arb.bus.nodes.nodes[1].state = PDCP_NODE_SETUP;
+    app.arb.bus.tables.devices[1].state = PDCP_PLACE_SETUP;
     begin_plan();
     make_slices(8);
-    app.arb.bus.nodes.nodes[1].state = PDCP_NODE_READY;
+    app.arb.bus.tables.devices[1].state = PDCP_PLACE_READY;
     tell(PDCP_EVENT_READY, 1);
     (void)finish_plan();
     expect_plan_of_the_tables();

@@ -352,7 +352,7 @@ static bool is_set_up_without(const parameter_t *refused)
             }
         }
     }
-    return x.arb->bus.nodes.nodes[0].state == PDCP_NODE_READY;
+    return x.arb->bus.tables.devices[0].state == PDCP_PLACE_READY;
 }
 
 static void test_a_setup_needs_the_mandatory_parameters(void)

@@ -60,7 +60,7 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
 {
     replay_t *replay = ctx;
     (void)now_ms;
-    if (event->kind != PDCP_EVENT_REQUEST && event->kind != PDCP_EVENT_WISH &&
+    if (event->kind != PDCP_EVENT_REQUEST && event->kind != PDCP_EVENT_LINK_REQUEST &&
         event->kind != PDCP_EVENT_RESET) {
         return;
     }
@@ -256,7 +256,7 @@ static uint8_t place_of(const replay_t *replay, const char *word, char behind)
 {
     uint8_t place;
     const uint8_t id = (uint8_t)number(replay, word, 16, 0xFF, behind);
-    if (!pdcp_nodes_owner(&replay->arb.bus.nodes, id, &place) || place == PDCP_NONE) {
+    if (!pdcp_tables_owner(&replay->arb.bus.tables, id, &place) || place == PDCP_NONE) {
         fail(replay, "no device has the id %02X", id);
     }
     return place;
@@ -267,7 +267,7 @@ static uint8_t channel_of(const replay_t *replay, const char *word)
 {
     const uint8_t place = place_of(replay, word, '.');
     const uint8_t index = byte_of(replay, strchr(word, '.') + 1);
-    return pdcp_nodes_channel(&replay->arb.bus.nodes, place, index);
+    return pdcp_tables_channel(&replay->arb.bus.tables, place, index);
 }
 
 static void must(const replay_t *replay, bool accepted)
@@ -377,13 +377,13 @@ static void do_full_bus(replay_t *replay, char *words[], size_t count)
 static void do_in_service(replay_t *replay, char *words[], size_t count)
 {
     static const pdcp_identity_t identity = {0xF000, 0xF000, 0xF000};
-    pdcp_nodes_t *nodes = &replay->arb.bus.nodes;
+    pdcp_tables_t *tables = &replay->arb.bus.tables;
     (void)words;
     (void)count;
-    if (nodes->nodes[PDCP_DEVICES_MAX - 1].state == PDCP_NODE_FREE) {
-        pdcp_nodes_add(nodes, PDCP_DEVICES_MAX - 1, &identity, 0xC8);
-        nodes->nodes[PDCP_DEVICES_MAX - 1].state = PDCP_NODE_READY;
-        nodes->nodes[PDCP_DEVICES_MAX - 1].ack_ms = PDCP_ACK_MS;
+    if (tables->devices[PDCP_DEVICES_MAX - 1].state == PDCP_PLACE_FREE) {
+        pdcp_tables_add(tables, PDCP_DEVICES_MAX - 1, &identity, 0xC8);
+        tables->devices[PDCP_DEVICES_MAX - 1].state = PDCP_PLACE_READY;
+        tables->devices[PDCP_DEVICES_MAX - 1].ack_ms = PDCP_ACK_MS;
     }
 }
 

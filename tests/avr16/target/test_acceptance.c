@@ -208,7 +208,7 @@ static void expect_link(int from, uint8_t output, int to, uint8_t input)
 
 static void expect_limb(void)
 {
-    TEST_ASSERT_EQUAL(3, pdcp_nodes_count_links(&app.arb.bus.nodes));
+    TEST_ASSERT_EQUAL(3, pdcp_tables_count_links(&app.arb.bus.tables));
     expect_link(D1, 1, D2, 2);
     expect_link(D2, 3, D3, WRIST);
     expect_link(D2, 5, D3, GRIP);
@@ -233,7 +233,7 @@ static void test_the_limb_links_itself(void)
     }
     TEST_ASSERT_LESS_OR_EQUAL(ARB_RAM_BUDGET, sizeof app);
     run_ms(450);
-    TEST_ASSERT_EQUAL(0, pdcp_nodes_count_links(&app.arb.bus.nodes));
+    TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&app.arb.bus.tables));
     run_ms(100);
     expect_limb();
 }

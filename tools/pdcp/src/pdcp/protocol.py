@@ -415,7 +415,7 @@ COUNTERS: tuple[tuple[str, tuple[tuple[str, str], ...]], ...] = (
             ("no_room", "channels that found their table full"),
             ("lost", "devices lost"),
             ("link_failed", "links that could not be made"),
-            ("stranger_reset", "unbound devices told to reset"),
+            ("unknown_reset", "unbound devices told to reset"),
             ("taken", "frames that the arbitrator made use of"),
             ("drop_silent", "dropped: on standby"),
             ("tx_discarded", "frames discarded when the bus went off"),

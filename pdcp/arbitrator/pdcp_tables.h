@@ -3,8 +3,8 @@
  * A device has a place (0 to PDCP_DEVICES_MAX - 1) from its binding until it is forgotten; its channels form
  * a list in the order of their indices in one pool. PDCP_NONE stands for no place and no channel. Looking up
  * a node id costs one read. Plain data: no frames, no time passes here. */
-#ifndef PDCP_NODES_H
-#define PDCP_NODES_H
+#ifndef PDCP_TABLES_H
+#define PDCP_TABLES_H
 
 #include <stdbool.h>
 #include <stdint.h>
@@ -16,13 +16,13 @@
 #define PDCP_NONE 0xFFu
 
 typedef enum {
-    PDCP_NODE_FREE = 0,
-    PDCP_NODE_SETUP,  /* bound, being read and written */
-    PDCP_NODE_READY,  /* set up: its channels count */
-    PDCP_NODE_FAILED, /* bound, but its setup failed: no channels, no links */
-    PDCP_NODE_LOST,   /* silent for too long: ids and links are kept for it */
-    PDCP_NODE_ASKED   /* its bind request is held (D-BUS-42): neither node id nor channels yet */
-} pdcp_node_state_t;
+    PDCP_PLACE_FREE = 0,
+    PDCP_PLACE_SETUP,  /* bound, being read and written */
+    PDCP_PLACE_READY,  /* set up: its channels count */
+    PDCP_PLACE_FAILED, /* bound, but its setup failed: no channels, no links */
+    PDCP_PLACE_LOST,   /* silent for too long: ids and links are kept for it */
+    PDCP_PLACE_ASKED   /* its bind request is held (D-BUS-42): neither node id nor channels yet */
+} pdcp_place_state_t;
 
 typedef struct {
     pdcp_identity_t identity;
@@ -34,7 +34,7 @@ typedef struct {
     uint16_t needs_at;    /* its block in the pool of needs */
     uint8_t needs_stride; /* bytes of one set: (inputs + 7) / 8; 0: it has no block */
     uint8_t place;        /* its own number in the table */
-    uint8_t state;        /* pdcp_node_state_t */
+    uint8_t state;        /* pdcp_place_state_t */
     uint8_t node_id;
     uint8_t channel_count;
     uint8_t first_channel; /* number in the pool, PDCP_NONE: has none */
@@ -49,7 +49,7 @@ typedef struct {
     uint8_t setup_channel;
     uint8_t setup_attempts;
     pdcp_request_t request;
-} pdcp_node_t;
+} pdcp_device_entry_t;
 
 typedef enum {
     PDCP_LINK_NONE = 0,
@@ -73,7 +73,7 @@ typedef enum {
 typedef struct {
     uint16_t type;
     uint16_t profile;
-    uint8_t node;     /* place of the owner; PDCP_NONE: this entry of the pool is free */
+    uint8_t place;    /* place of the owner; PDCP_NONE: this entry of the pool is free */
     uint8_t index;    /* channel index, 1 to n */
     uint8_t next;     /* the owner's next channel, PDCP_NONE: the last */
     uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
@@ -89,96 +89,96 @@ typedef struct {
 typedef struct {
     uint16_t needs_used;
     pdcp_channel_t channels[PDCP_CHANNELS_MAX];
-    pdcp_node_t nodes[PDCP_DEVICES_MAX];
+    pdcp_device_entry_t devices[PDCP_DEVICES_MAX];
     uint8_t
         owner[256]; /* node id: 0 free; place + 1: the device's own; 80h + place + 1: of one of its outputs */
     uint8_t needs[PDCP_NEEDS_BYTES];
-} pdcp_nodes_t;
+} pdcp_tables_t;
 
-void pdcp_nodes_init(pdcp_nodes_t *nodes);
+void pdcp_tables_init(pdcp_tables_t *tables);
 
 /* Place of the device with this identity, in any state but free; PDCP_NONE: there is none. */
-uint8_t pdcp_nodes_find(const pdcp_nodes_t *nodes, const pdcp_identity_t *identity);
+uint8_t pdcp_tables_find(const pdcp_tables_t *tables, const pdcp_identity_t *identity);
 
 /* A place for one more device; PDCP_NONE: there is none. */
-uint8_t pdcp_nodes_free_place(const pdcp_nodes_t *nodes);
+uint8_t pdcp_tables_free_place(const pdcp_tables_t *tables);
 
 /* Takes a free place for a device with this node id, which must be free. */
-void pdcp_nodes_add(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id);
+void pdcp_tables_add(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id);
 
 /* Takes a free place for a device whose bind request is held. */
-void pdcp_nodes_hold(pdcp_nodes_t *nodes, uint8_t place, const pdcp_identity_t *identity);
+void pdcp_tables_hold(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t *identity);
 
-/* Is there a device at this place that can be asked: bound, and not lost? node: any number. */
-bool pdcp_nodes_is_bound(const pdcp_nodes_t *nodes, uint8_t node);
+/* Is there a device at this place that can be asked: bound, and not lost? place: any number. */
+bool pdcp_tables_is_bound(const pdcp_tables_t *tables, uint8_t place);
 
 /* How many places are in this state. */
-uint8_t pdcp_nodes_count_state(const pdcp_nodes_t *nodes, pdcp_node_state_t state);
+uint8_t pdcp_tables_count_state(const pdcp_tables_t *tables, pdcp_place_state_t state);
 
 /* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
  * nothing. */
-void pdcp_nodes_remove(pdcp_nodes_t *nodes, uint8_t node);
+void pdcp_tables_remove(pdcp_tables_t *tables, uint8_t place);
 
 /* Gives a device exactly count channels, indices 1 to count, keeping those that it has. False: the pool is
  * too small; nothing is changed. */
-bool pdcp_nodes_set_channels(pdcp_nodes_t *nodes, uint8_t node, uint8_t count);
+bool pdcp_tables_set_channels(pdcp_tables_t *tables, uint8_t place, uint8_t count);
 
 /* Channel number of a device's channel index; PDCP_NONE: it has no such channel. */
-uint8_t pdcp_nodes_channel(const pdcp_nodes_t *nodes, uint8_t node, uint8_t index);
+uint8_t pdcp_tables_channel(const pdcp_tables_t *tables, uint8_t place, uint8_t index);
 
 /* Makes the source of an input that of an unconnected one (D-BUS-7). */
-void pdcp_nodes_clear_source(pdcp_channel_t *input);
+void pdcp_tables_clear_source(pdcp_channel_t *input);
 
 /* Takes over a parameter that names the source of an input: 5, 6 or 8, its two numbers of 16 bits. */
-void pdcp_nodes_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
+void pdcp_tables_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Does this channel index name a source? An unconnected input has FFh (D-BUS-7). */
-static inline bool pdcp_nodes_is_named(uint8_t index)
+static inline bool pdcp_tables_is_named(uint8_t index)
 {
     return index != PDCP_NO_SOURCE_INDEX && index != 0;
 }
 
 /* Do the numbers of such a parameter say what the tables say? */
-bool pdcp_nodes_is_source(const pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
+bool pdcp_tables_is_source(const pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
  * room, the device then has no needs. */
-bool pdcp_nodes_make_needs(pdcp_nodes_t *nodes, uint8_t node);
+bool pdcp_tables_make_needs(pdcp_tables_t *tables, uint8_t place);
 
 /* Stores a piece of a channel's bit string of required or desired channels: len bytes from byte offset on,
  * which is below PDCP_PARAMETER_MAX. Bit 7 of byte 0 is channel index 0 (D-BUS-8). Bits of channels that are
  * no inputs of the device are dropped (D-BUS-13). */
-void pdcp_nodes_put_needs(pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint16_t offset,
-                          const uint8_t *bytes, uint16_t len);
+void pdcp_tables_put_needs(pdcp_tables_t *tables, uint8_t channel, bool desired, uint16_t offset,
+                           const uint8_t *bytes, uint16_t len);
 
 /* Does channel need (or desire) the input with this index of its own device, which must have room for
  * needs? */
-bool pdcp_nodes_needs(const pdcp_nodes_t *nodes, uint8_t channel, bool desired, uint8_t index);
+bool pdcp_tables_needs(const pdcp_tables_t *tables, uint8_t channel, bool desired, uint8_t index);
 
 /* No input is fed by this channel any more: it is gone, or no output now. */
-void pdcp_nodes_drop_feed(pdcp_nodes_t *nodes, uint8_t channel);
+void pdcp_tables_drop_source(pdcp_tables_t *tables, uint8_t channel);
 
 /* May an input still listen to this node id? It may until 0 was answered, in parameter 7 or to transfer
  * enabled (D-BUS-36). */
-bool pdcp_nodes_may_hear(const pdcp_nodes_t *nodes, uint8_t node_id);
+bool pdcp_tables_may_hear(const pdcp_tables_t *tables, uint8_t node_id);
 
 /* Channel number of the output of a device that has this node id; PDCP_NONE: it has none. */
-uint8_t pdcp_nodes_output(const pdcp_nodes_t *nodes, uint8_t node, uint8_t node_id);
+uint8_t pdcp_tables_output(const pdcp_tables_t *tables, uint8_t place, uint8_t node_id);
 
 /* The input that keeps this one, which must be another's, from the output, because both want it for
  * themselves (D-API-13); PDCP_NONE: there is none. An inactive link counts, since it comes back, but less
  * than one that works; so does that which the input itself has to this output. */
-uint8_t pdcp_nodes_rival(const pdcp_nodes_t *nodes, uint8_t output, uint8_t input);
+uint8_t pdcp_tables_rival(const pdcp_tables_t *tables, uint8_t output, uint8_t input);
 
 /* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
-void pdcp_nodes_set_output_id(pdcp_nodes_t *nodes, pdcp_channel_t *output, uint8_t node_id);
+void pdcp_tables_set_output_id(pdcp_tables_t *tables, pdcp_channel_t *output, uint8_t node_id);
 
 /* Is the node id the device's own (true), or that of one of its outputs (false)? node: place of the owner,
  * PDCP_NONE: nobody has this id. */
-static inline bool pdcp_nodes_owner(const pdcp_nodes_t *nodes, uint8_t node_id, uint8_t *node)
+static inline bool pdcp_tables_owner(const pdcp_tables_t *tables, uint8_t node_id, uint8_t *place)
 {
-    const uint8_t owner = nodes->owner[node_id];
-    *node = (uint8_t)((owner & 0x7Fu) - 1u);
+    const uint8_t owner = tables->owner[node_id];
+    *place = (uint8_t)((owner & 0x7Fu) - 1u);
     return (owner & 0x80u) == 0;
 }
 
@@ -193,37 +193,37 @@ enum {
 
 /* The number-th (from 1) of what counts, and how many there are. PDCP_NONE: there are fewer. Order: places,
  * then channel indices. */
-uint8_t pdcp_nodes_nth(const pdcp_nodes_t *nodes, uint8_t kind, uint8_t number);
-uint8_t pdcp_nodes_count(const pdcp_nodes_t *nodes, uint8_t kind);
+uint8_t pdcp_tables_nth(const pdcp_tables_t *tables, uint8_t kind, uint8_t number);
+uint8_t pdcp_tables_count(const pdcp_tables_t *tables, uint8_t kind);
 
-static inline uint8_t pdcp_nodes_nth_device(const pdcp_nodes_t *nodes, uint8_t number)
+static inline uint8_t pdcp_tables_nth_device(const pdcp_tables_t *tables, uint8_t number)
 {
-    return pdcp_nodes_nth(nodes, PDCP_COUNTS_DEVICE, number);
+    return pdcp_tables_nth(tables, PDCP_COUNTS_DEVICE, number);
 }
 
-static inline uint8_t pdcp_nodes_nth_channel(const pdcp_nodes_t *nodes, uint8_t transfer, uint8_t number)
+static inline uint8_t pdcp_tables_nth_channel(const pdcp_tables_t *tables, uint8_t transfer, uint8_t number)
 {
-    return pdcp_nodes_nth(nodes, transfer, number);
+    return pdcp_tables_nth(tables, transfer, number);
 }
 
-static inline uint8_t pdcp_nodes_nth_link(const pdcp_nodes_t *nodes, uint8_t number)
+static inline uint8_t pdcp_tables_nth_link(const pdcp_tables_t *tables, uint8_t number)
 {
-    return pdcp_nodes_nth(nodes, PDCP_COUNTS_LINK, number);
+    return pdcp_tables_nth(tables, PDCP_COUNTS_LINK, number);
 }
 
-static inline uint8_t pdcp_nodes_count_devices(const pdcp_nodes_t *nodes)
+static inline uint8_t pdcp_tables_count_devices(const pdcp_tables_t *tables)
 {
-    return pdcp_nodes_count(nodes, PDCP_COUNTS_DEVICE);
+    return pdcp_tables_count(tables, PDCP_COUNTS_DEVICE);
 }
 
-static inline uint8_t pdcp_nodes_count_channels(const pdcp_nodes_t *nodes, uint8_t transfer)
+static inline uint8_t pdcp_tables_count_channels(const pdcp_tables_t *tables, uint8_t transfer)
 {
-    return pdcp_nodes_count(nodes, transfer);
+    return pdcp_tables_count(tables, transfer);
 }
 
-static inline uint8_t pdcp_nodes_count_links(const pdcp_nodes_t *nodes)
+static inline uint8_t pdcp_tables_count_links(const pdcp_tables_t *tables)
 {
-    return pdcp_nodes_count(nodes, PDCP_COUNTS_LINK);
+    return pdcp_tables_count(tables, PDCP_COUNTS_LINK);
 }
 
 #endif

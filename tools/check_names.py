@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
 """Checks that a function that other files may call bears the name of its file: pdcp_link_step is found in pdcp_link.c.
+Checks, too, that no name in the portable folders holds a word that docs/glossary.md has retired.
 
 Two kinds of files give other names: those of a target carry out the contracts of hal/include, and ALSO lists a few with
 their reasons.
@@ -13,7 +14,7 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
-from check_layers import COMMENT_OR_LITERAL, blank, find_functions
+from check_layers import COMMENT_OR_LITERAL, IDENTIFIER, PORTABLE, blank, find_functions, line_of
 
 FOLDERS = ("pdcp", "profile", "firmware", "hal", "host_sim")
 
@@ -23,6 +24,9 @@ ALSO = {
     "nvm_flash": "nvm",
     "can_gs_usb_absent": "can_gs_usb",  # stands for it where there is no libusb
 }
+
+# Word -> the one that docs/glossary.md has for it; the retired words that mean nothing else in a name.
+RETIRED = {"stranger": "unknown", "strangers": "unknown", "wish": "request", "feed": "source", "slot": "place"}
 
 # The link-time contract of a target (hal/include): any file of the target may carry a part of it out.
 CONTRACT = "hal_"
@@ -52,17 +56,29 @@ def check_file(path: Path, text: str) -> Iterator[tuple[int, str]]:
         yield line, f"{name} does not begin with {prefixes(path)[0]}"
 
 
+def check_words(text: str) -> Iterator[tuple[int, str]]:
+    code = COMMENT_OR_LITERAL.sub(blank, text)
+    for match in IDENTIFIER.finditer(code):
+        for word in match.group().lower().split("_"):
+            if word in RETIRED:
+                yield line_of(code, match.start()), f"{match.group()}: say {RETIRED[word]}, not {word} (docs/glossary.md)"
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description="check that names begin with the name of their file")
     parser.add_argument("root", type=Path, nargs="?", default=Path(__file__).resolve().parent.parent)
     root: Path = parser.parse_args().root
-    files = [path for folder in FOLDERS for path in sorted((root / folder).rglob("*.c"))]
+    files = [path for folder in FOLDERS for path in sorted((root / folder).rglob("*.[ch]"))]
     if not files:
         print(f"check_names: no C files in the folders of {root}", file=sys.stderr)
         return 2
     count = 0
     for path in files:
-        for line, message in check_file(path, path.read_text(encoding="utf-8")):
+        text = path.read_text(encoding="utf-8")
+        found = [*check_file(path, text)] if path.suffix == ".c" else []
+        if path.relative_to(root).parts[0] in PORTABLE:
+            found += check_words(text)
+        for line, message in found:
             print(f"{path.relative_to(root).as_posix()}:{line}: {message}")
             count += 1
     print(f"check_names: {len(files)} files, {count} violations", file=sys.stderr)

@@ -44,6 +44,19 @@ def test_name_of_another_file_is_found(tmp_path: Path, function: str) -> None:
     assert (status, output) == (1, [f"pdcp/common/pdcp_txq.c:{line}: {name} does not begin with pdcp_txq"])
 
 
+@pytest.mark.parametrize("name", ["on_stranger", "PDCP_EVENT_WISH", "feed", "slot_at"])
+def test_retired_word_is_found(tmp_path: Path, name: str) -> None:
+    status, output = run_check(tmp_path, "pdcp/common/pdcp_txq.h", f"/* {name} */\nextern int {name};\n")
+    assert status == 1
+    assert len(output) == 1
+    assert output[0].startswith(f"pdcp/common/pdcp_txq.h:2: {name}: say ")
+
+
+@pytest.mark.parametrize("name", ["feedback", "wishbone", "slots_of_time"])
+def test_similar_word_passes(tmp_path: Path, name: str) -> None:
+    assert run_check(tmp_path, "pdcp/common/pdcp_txq.h", f"extern int {name};\n") == (0, [])
+
+
 def test_tree_without_sources_is_an_error(tmp_path: Path) -> None:
     result = subprocess.run([sys.executable, SCRIPT, tmp_path], capture_output=True, check=False)
     assert result.returncode == 2

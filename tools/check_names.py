@@ -61,7 +61,8 @@ def check_words(text: str) -> Iterator[tuple[int, str]]:
     for match in IDENTIFIER.finditer(code):
         for word in match.group().lower().split("_"):
             if word in RETIRED:
-                yield line_of(code, match.start()), f"{match.group()}: say {RETIRED[word]}, not {word} (docs/glossary.md)"
+                message = f"{match.group()}: say {RETIRED[word]}, not {word} (docs/glossary.md)"
+                yield line_of(code, match.start()), message
 
 
 def main() -> int:

@@ -201,10 +201,10 @@ uint32_t bench_bus_ms(const bench_bus_t *bench)
 
 bool bench_bus_ready(const bench_bus_t *bench)
 {
-    const pdcp_device_entry_t *tables = bench->app.arb.bus.tables.devices;
+    const pdcp_device_entry_t *devices = bench->app.arb.bus.tables.devices;
     uint8_t ready = 0;
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
-        ready = (uint8_t)(ready + (nodes[i].state == PDCP_PLACE_READY));
+        ready = (uint8_t)(ready + (devices[i].state == PDCP_PLACE_READY));
     }
     return ready == bench->member_count;
 }

@@ -232,13 +232,16 @@ AUDIT = {"030401": "8301040100"}
 OUTPUT_ID_WRITTEN = r"040501([0-9A-F]{2})"
 
 
-def play_device(candump: Candump, player: Player, start: int, done: str) -> list[str]:
-    """Answers as the device with id 11h whatever is asked from frame number start on, until done is among it."""
+def play_device(candump: Candump, player: Player, start: int, done: str, end: str | None = None) -> list[str]:
+    """Answers as the device with id 11h whatever is asked from frame number start on, until done is among it or the
+    frame end is on the bus. Returns what was asked but the audit's questions."""
     requests: list[str] = []
     deadline = time.monotonic() + DEADLINE_S
     while True:
         texts = candump.texts()
         for text in texts[start:]:
+            if text == end:
+                return requests
             if not text.startswith("311#") or text.startswith("311#81"):
                 continue
             request = text.removeprefix("311#")
@@ -280,11 +283,17 @@ def device_by_hand_is_set_up(bench: Bench) -> None:
 
 
 def another_of_its_name(candump: Candump, player: Player) -> None:
-    """A bound identity asks again (D-BUS-6): parameter 1 is read from its id, an answer means that there are two."""
-    start = len(candump.lines)
-    cansend(f"622#01{SERIAL['A']}")
-    assert play_device(candump, player, start, "030100") == ["030100"]
-    candump.await_frame(f"322#8100{SERIAL['A']}", start)
+    """A bound identity asks again (D-BUS-6): parameter 1 is read from its id, an answer means that there are two.
+
+    While the audit waits for an answer, that answer shows it as well (D-BUS-41), and parameter 1 is not read."""
+    refused = f"322#8100{SERIAL['A']}"
+    requests: list[str] = []
+    while not requests:
+        start = len(candump.lines)
+        cansend(f"622#01{SERIAL['A']}")
+        requests = play_device(candump, player, start, "030100", refused)
+        candump.await_frame(refused, start)
+    assert requests == ["030100"]
     start = len(candump.lines)
     cansend(f"611#01{SERIAL['A']}")
     candump.await_frame("311#030100", start)  # nobody answers: it was reset

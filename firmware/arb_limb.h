@@ -38,7 +38,7 @@ typedef struct {
     uint8_t number;   /* configuration that is being read, saved, loaded or erased */
     int8_t status;    /* of the job of arb_config that has ended: arb_config_status_t */
     bool ended;       /* what the host waits for is there: */
-    uint8_t error;    /* arb_error_t */
+    uint8_t error;    /* ARB_ERR_... (arb_error.h) */
     uint16_t result;
     bool told;           /* active and stored configurations are as the host knows them */
     bool unsaved;        /* the configuration was changed, for auto-save */

@@ -174,16 +174,18 @@ uint8_t arb_hostbus_configure_link(arb_call_t *call)
 /* To all devices: Suspend (with its time) or Release only [PDCP 3.2.4, 3.2.5]. */
 static uint8_t broadcast(arb_call_t *call, uint8_t dlc, const uint8_t *data)
 {
-    if (data[0] != PDCP_SUSPEND && data[0] != PDCP_RELEASE) {
+    const uint8_t code = data[PDCP_RAW_CODE];
+    if (code != PDCP_SUSPEND && code != PDCP_RELEASE) {
         return ARB_ERR_NOT_SUPPORTED;
     }
-    if (dlc != (data[0] == PDCP_SUSPEND ? 3 : 1)) {
+    if (dlc != (code == PDCP_SUSPEND ? 3 : 1)) {
         return ARB_ERR_VALUE;
     }
     if (call->arb->silent) {
         return ARB_ERR_NOT_READY;
     }
-    if (!pdcp_arb_broadcast(call->arb, data[0], pdcp_bytes_get_u16(&data[1]))) { /* Release has no time */
+    if (!pdcp_arb_broadcast(call->arb, code,
+                            pdcp_bytes_get_u16(&data[PDCP_RAW_TIME]))) { /* Release has no time */
         return ARB_ERR_BUSY;
     }
     call->api->handed = true;
@@ -235,8 +237,9 @@ uint8_t arb_hostbus_passthrough(arb_call_t *call)
     if (call->place[0] == PDCP_NONE) {
         return ARB_ERR_DEVICE;
     }
-    if (!may_pass(data[0]) ||
-        (data[0] == PDCP_SET_PARAMETER && dlc >= 3 && is_arbitrators(call, data[2], data[1]))) {
+    if (!may_pass(data[PDCP_RAW_CODE]) ||
+        (data[PDCP_RAW_CODE] == PDCP_SET_PARAMETER && dlc > PDCP_RAW_CHANNEL &&
+         is_arbitrators(call, data[PDCP_RAW_CHANNEL], data[PDCP_RAW_PARAM]))) {
         return ARB_ERR_NOT_SUPPORTED;
     }
     const pdcp_status_t status =

@@ -32,11 +32,6 @@ void pdcp_arb_know(pdcp_arb_t *arb, pdcp_knows_fn knows)
 
 /* --- Frames --- */
 
-static bool is_reset_answer(const can_frame_t *frame)
-{
-    return frame->dlc != 0 && frame->data[0] == (PDCP_RESET | PDCP_ANSWER);
-}
-
 static bool is_young(const pdcp_arb_t *arb)
 {
     return pdcp_bus_age_ms(&arb->bus) < PDCP_YOUNG_MS;
@@ -51,7 +46,7 @@ static bool on_unknown(pdcp_arb_t *arb, const can_frame_t *frame)
         return false;
     }
     arb->bus.bind.shut = arb->bus.bind.shut || pdcp_bus_age_ms(&arb->bus) < PDCP_SHUT_MS;
-    if (is_reset_answer(frame)) {
+    if (pdcp_codec_has_code(frame, PDCP_RESET | PDCP_ANSWER)) {
         pdcp_unknown_note_answer(&arb->bus.unknown, arb->bus.now_ms, id);
     } else {
         pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
@@ -339,8 +334,8 @@ pdcp_status_t pdcp_arb_command(pdcp_arb_t *arb, uint8_t place, uint8_t code, uin
 
 pdcp_status_t pdcp_arb_passthrough(pdcp_arb_t *arb, uint8_t place, uint8_t *data, uint8_t dlc)
 {
-    const pdcp_status_t status =
-        pdcp_host_ask(&arb->bus, &arb->host, place, data[2], data[1], data, dlc, data[0]);
+    const pdcp_status_t status = pdcp_host_ask(&arb->bus, &arb->host, place, data[PDCP_RAW_CHANNEL],
+                                               data[PDCP_RAW_PARAM], data, dlc, data[PDCP_RAW_CODE]);
     if (status == PDCP_OK) {
         arb->host.client = PDCP_CLIENT_RAW;
     }

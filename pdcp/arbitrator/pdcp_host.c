@@ -73,7 +73,7 @@ uint8_t pdcp_host_give_up(pdcp_bus_t *bus, pdcp_host_request_t *host)
 /* The host has written a parameter, which may stand in the tables (D-BUS-25). */
 static pdcp_host_outcome_t take_written(pdcp_bus_t *bus, const pdcp_host_request_t *host)
 {
-    const uint8_t head = host->client == PDCP_CLIENT_RAW ? 3 : 0;
+    const uint8_t head = host->client == PDCP_CLIENT_RAW ? PDCP_RAW_VALUE : 0;
     if (host->size < head) {
         return PDCP_HOST_NOTHING;
     }
@@ -93,8 +93,8 @@ static pdcp_host_outcome_t take_written(pdcp_bus_t *bus, const pdcp_host_request
 
 static bool has_succeeded(const pdcp_host_request_t *host, const pdcp_reply_t *reply)
 {
-    const bool is_refused =
-        host->client == PDCP_CLIENT_RAW && reply->len >= 2 && reply->bytes[1] != PDCP_SUCCESS;
+    const bool is_refused = host->client == PDCP_CLIENT_RAW && reply->len > PDCP_RAW_RESULT &&
+                            reply->bytes[PDCP_RAW_RESULT] != PDCP_SUCCESS;
     return reply->status == PDCP_OK && !is_refused;
 }
 
@@ -105,8 +105,9 @@ static pdcp_host_outcome_t follow(pdcp_bus_t *bus, const pdcp_host_request_t *ho
         return take_written(bus, host);
     }
     if (host->code == PDCP_SUSPEND || host->code == PDCP_RELEASE) {
-        const uint16_t time_ms =
-            host->client == PDCP_CLIENT_RAW ? pdcp_bytes_value_u16(host->bytes, host->size, 1) : host->size;
+        const uint16_t time_ms = host->client == PDCP_CLIENT_RAW
+                                     ? pdcp_bytes_value_u16(host->bytes, host->size, PDCP_RAW_TIME)
+                                     : host->size;
         pdcp_suspend_on_host(bus, host->place, host->code, time_ms);
     }
     return PDCP_HOST_NOTHING;

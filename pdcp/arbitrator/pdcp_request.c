@@ -320,12 +320,13 @@ bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t place, const can_frame_t *fr
 {
     pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     const pdcp_request_t *request = &device->request;
-    if (request->state != PDCP_REQUEST_RAW || frame->dlc == 0 ||
-        frame->data[0] != (request->code | PDCP_ANSWER)) {
+    if (request->state != PDCP_REQUEST_RAW ||
+        !pdcp_codec_has_code(frame, request->code | (unsigned)PDCP_ANSWER)) {
         return false;
     }
-    if (is_parameter(request) && request->size >= 3 && frame->dlc >= 4 &&
-        (frame->data[2] != request->param || frame->data[3] != request->channel)) {
+    if (is_parameter(request) && request->size > PDCP_RAW_CHANNEL && frame->dlc > PDCP_RAW_ANSWER_CHANNEL &&
+        (frame->data[PDCP_RAW_ANSWER_PARAM] != request->param ||
+         frame->data[PDCP_RAW_ANSWER_CHANNEL] != request->channel)) {
         return false; /* well-formed, and about another parameter or channel */
     }
     pdcp_bus_count(bus, PDCP_STAT_TAKEN);

@@ -139,7 +139,7 @@ static void on_foreign_request(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
     pdcp_audit_on_foreign(&arb->bus, id);
-    if (frame->dlc == 3 && frame->data[0] == PDCP_SUSPEND) {
+    if (frame->dlc == 3 && pdcp_codec_has_code(frame, PDCP_SUSPEND)) {
         pdcp_suspend_on_foreign(&arb->bus, id);
     }
 }

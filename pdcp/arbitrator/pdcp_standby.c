@@ -56,7 +56,7 @@ void pdcp_standby_on_request(pdcp_standby_t *standby, const can_frame_t *frame)
 
 bool pdcp_standby_on_answer(pdcp_standby_t *standby, uint32_t now_ms, const can_frame_t *frame)
 {
-    if (frame->dlc == 0 || frame->data[0] != (standby->asked_code | PDCP_ANSWER)) {
+    if (!pdcp_codec_has_code(frame, standby->asked_code | (unsigned)PDCP_ANSWER)) {
         return false;
     }
     standby->asked_id = 0;

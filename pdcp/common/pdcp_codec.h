@@ -52,10 +52,28 @@ static inline uint8_t pdcp_id_node(uint16_t can_id)
     return (uint8_t)(can_id & 0xFFu);
 }
 
+/* Bytes of data that is passed through undecoded: a frame that a host has made, and the answer to it. */
+enum {
+    PDCP_RAW_CODE = 0,
+    PDCP_RAW_PARAM = 1,   /* requests 03 and 04: parameter id */
+    PDCP_RAW_CHANNEL = 2, /* the same: channel index */
+    PDCP_RAW_VALUE = 3,   /* 04: value */
+    PDCP_RAW_TIME = 1,    /* 08: time in ms, two bytes */
+    PDCP_RAW_RESULT = 1,  /* answers but 81: response code */
+    PDCP_RAW_ANSWER_PARAM = 2,
+    PDCP_RAW_ANSWER_CHANNEL = 3
+};
+
+/* Does the frame carry this function code? */
+static inline bool pdcp_codec_has_code(const can_frame_t *frame, unsigned code)
+{
+    return frame->dlc != 0 && frame->data[PDCP_RAW_CODE] == code;
+}
+
 /* Is the frame a beacon, of whomever? */
 static inline bool pdcp_codec_is_beacon(const can_frame_t *frame)
 {
-    return frame->dlc == 1 && frame->data[0] == PDCP_BEACON;
+    return frame->dlc == 1 && frame->data[PDCP_RAW_CODE] == PDCP_BEACON;
 }
 
 /* The value of parameter 7 as one number: node id of the source's device, then that of the output. */

@@ -62,7 +62,7 @@ typedef enum {
     PROFILE_PHASE_SETTLE,
     PROFILE_PHASE_AUTO,
     PROFILE_PHASE_ROUND_END,
-    PROFILE_PHASE_FINISH,
+    PROFILE_PHASE_WRITE_DOWN,
     PROFILE_PHASE_DONE,
     PROFILE_PHASE_NEXT_PART /* only returned: this part of the round is over, the next one begins */
 } profile_phase_t;

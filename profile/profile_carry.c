@@ -136,7 +136,8 @@ static uint8_t next_input(const profile_run_t *run)
     return found;
 }
 
-static void finish(profile_run_t *run)
+/* The plan is carried out: all links that it wants are made, or their ends have gone. */
+static void end_plan(profile_run_t *run)
 {
     run->state = PROFILE_RUNNING;
     run->what = 0;
@@ -158,7 +159,7 @@ bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
     }
     const uint8_t input = next_input(run);
     if (input == PDCP_NONE) {
-        finish(run);
+        end_plan(run);
         return false;
     }
     run->request.input = input;

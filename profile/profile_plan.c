@@ -100,7 +100,7 @@ static profile_phase_t end_round(profile_board_t *board)
     const uint32_t now = hash_planned(board);
     board->plan.rounds++;
     if (board->plan.rounds == ROUNDS_MAX || (now == board->plan.before && !board->repair.named)) {
-        return PROFILE_PHASE_FINISH;
+        return PROFILE_PHASE_WRITE_DOWN;
     }
     board->plan.before = now;
     board->repair.named = false;
@@ -129,7 +129,9 @@ static profile_phase_t next_part(profile_board_t *board)
 
 /* --- The end of a plan --- */
 
-static profile_phase_t finish(profile_board_t *board)
+/* The plan is made: writes down in the configuration what it has decided. Nothing is sent here; profile_carry.c
+ * carries the plan out. */
+static profile_phase_t write_down(profile_board_t *board)
 {
     profile_board_forget_stand_ins(board);
     for (uint8_t e = 0; e < board->links->count; e++) {
@@ -162,7 +164,7 @@ static void do_phase(profile_board_t *board)
         [PROFILE_PHASE_SETTLE] = profile_settle,
         [PROFILE_PHASE_AUTO] = autoconfigure,
         [PROFILE_PHASE_ROUND_END] = end_round,
-        [PROFILE_PHASE_FINISH] = finish,
+        [PROFILE_PHASE_WRITE_DOWN] = write_down,
     };
     profile_phase_t next = phases[board->phase](board);
     if (next == PROFILE_PHASE_NEXT_PART) {

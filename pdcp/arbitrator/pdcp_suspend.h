@@ -1,9 +1,10 @@
-/* Suspended devices (pdcp-bus.md 9): what the host has suspended stays so, what somebody else has suspended
+/* Suspended devices (pdcp-bus.md 9.3): what the host has suspended stays so, what somebody else has suspended
  * is released (D-BUS-40).
  *
- * Nobody but the arbitrator sends Suspend, and it does so only for its host. A Suspend of somebody else stops
- * data that the tables call active. Release follows some milliseconds later, so that many Suspends lead to
- * few Releases. */
+ * Only times are kept here. No link changes: those of a suspended device stay active (D-BUS-61). Nobody but
+ * the arbitrator sends Suspend, and it does so only for its host. A Suspend of somebody else stops data that
+ * the tables call active. Release follows some milliseconds later, so that many Suspends lead to few
+ * Releases. */
 #ifndef PDCP_SUSPEND_H
 #define PDCP_SUSPEND_H
 

@@ -23,7 +23,8 @@ static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
     }
 }
 
-/* Parts of a stored configuration keep their places when unknown devices crowd in (D-BUS-43). */
+/* Parts of a stored configuration keep their places when unknown devices crowd in (D-BUS-43). Now and then an
+ * unknown device is taken for one (D-BUS-53). */
 static bool knows(void *ctx, const pdcp_identity_t *identity)
 {
     const arb_app_t *app = ctx;

@@ -108,6 +108,7 @@ static void end(arb_limb_t *limb, uint8_t error)
     limb->error = error;
 }
 
+/* What the host is told (D-API-4). */
 uint8_t arb_limb_error(arb_config_status_t status)
 {
     switch (status) {
@@ -271,7 +272,7 @@ static uint8_t begin_load(arb_limb_t *limb)
     return arb_config_has(&limb->config, limb->number) ? read_all(limb, STAGE_CHECK) : ARB_ERR_NUMBER;
 }
 
-/* The memory can be read, and there is room: now the links go into the table. */
+/* If the memory can be read, and there is room (D-PRO-11), the links go into the table now. */
 static void end_check(arb_limb_t *limb)
 {
     if (limb->status != ARB_CONFIG_OK || limb->score > PROFILE_LINKS_MAX ||
@@ -288,6 +289,7 @@ static void plan(arb_limb_t *limb, uint8_t what, bool anew)
     profile_run_begin(&limb->run, what, anew);
 }
 
+/* Originals and replacements are made, and nothing is autoconfigured (D-PRO-16). */
 static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status != ARB_CONFIG_OK) { /* it could be read a moment ago */
@@ -342,7 +344,7 @@ uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
     limb->ended = false;
     limb->error = ARB_OK;
     limb->result = 0;
-    limb->number = argument != 0 ? argument : limb->active;
+    limb->number = argument != 0 ? argument : limb->active; /* D-PRO-16 */
     switch ((arb_action_t)action) {
     case ARB_ACTION_SAVE:
         return begin_save(limb);

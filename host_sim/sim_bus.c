@@ -164,7 +164,8 @@ bool sim_bus_send(sim_bus_t *bus, int port, const can_frame_t *frame)
     return true;
 }
 
-/* Puts the winner of the arbitration on the wire. At least one frame is waiting. */
+/* Puts the winner of the arbitration on the wire, of equals that of the lowest port (D-SIM-1). At least one
+ * frame is waiting. */
 static void start_frame(sim_bus_t *bus)
 {
     int winner = -1;

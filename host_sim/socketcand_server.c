@@ -394,6 +394,7 @@ static void on_socket(void *ctx, uint32_t events)
     tell_news(server);
 }
 
+/* The hold of frames behind < rawmode > is over (D-SIM-2). */
 static void on_hold_over(void *ctx, uint32_t events)
 {
     socketcand_server_t *server = ctx;

@@ -30,6 +30,8 @@ void profile_active_remove(profile_run_t *run, uint8_t entry)
     profile_links_remove(&run->links, entry);
 }
 
+/* A link that is made or named becomes part of the configuration (D-PRO-11), but for one that is only named
+ * and whose output is taken (D-PRO-19). */
 bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host)
 {
     const pdcp_tables_t *tables = run->scene.tables;
@@ -46,6 +48,7 @@ bool profile_active_adopt(profile_run_t *run, uint8_t input, bool by_host)
     return true;
 }
 
+/* A link that stands in for another is left out (D-PRO-11). */
 bool profile_active_take_up(profile_run_t *run)
 {
     bool complete = true;
@@ -77,6 +80,7 @@ static uint8_t next_input_of(const pdcp_tables_t *tables, uint8_t place, uint8_t
     return best;
 }
 
+/* Sources that inputs name become part of the configuration (D-PRO-19). */
 void profile_active_read_back(profile_run_t *run, uint8_t place)
 {
     uint8_t input = PDCP_NONE;

@@ -145,6 +145,7 @@ static void end_plan(profile_run_t *run)
     (void)profile_active_take_up(run);
 }
 
+/* Carries out a plan that is whole: takes links away, then makes them one by one (D-PRO-5). */
 bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
 {
     if (!pdcp_arb_links_settled(arb)) {

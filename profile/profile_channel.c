@@ -12,6 +12,7 @@ bool profile_channel_is_terminal(const pdcp_channel_t *channel)
     return (channel->type & PROFILE_TYPE_TERMINAL) != 0;
 }
 
+/* The terminal profile gives the priority, or else the profile (D-PRO-3). */
 uint16_t profile_channel_priority(const pdcp_channel_t *channel)
 {
     return channel->terminal_profile != 0 ? channel->terminal_profile : channel->profile;

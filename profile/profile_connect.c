@@ -14,7 +14,7 @@ static uint8_t only_source(const profile_board_t *board, uint8_t output)
     return profile_board_may_link(board, output, top->input) ? output : (uint8_t)PDCP_NONE;
 }
 
-/* The most similar output to the one that an entry names, if that is missing. */
+/* The most similar output to the one that an entry names, if that is missing (D-PRO-10). */
 static uint8_t next_replacement(profile_board_t *board, uint8_t entry)
 {
     const profile_frame_t *top = &board->connect.top;
@@ -181,6 +181,6 @@ void profile_connect_step(profile_board_t *board)
     } else if (board->connect.depth < PROFILE_PLAN_DEPTH - 1) {
         descend(board, top->cursor);
     } else if (is_required(top->need)) {
-        reject(board); /* too deep */
+        reject(board); /* too deep (D-PRO-17) */
     }
 }

@@ -6,6 +6,7 @@
 #include "profile_channel.h"
 #include "profile_start.h"
 
+/* A device has come. Without a stored configuration the sources that it names count (D-PRO-6, D-PRO-19). */
 static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t place)
 {
     const bool urgent = run->urgent;
@@ -62,7 +63,8 @@ static void on_broken(profile_run_t *run, uint8_t input)
 }
 
 /* A link that this layer has asked for was made or has failed. An answer may be missing on a bad line, or
- * when a device was away for a moment. That must not lead to another limb, so the link is tried again. */
+ * when a device was away for a moment. That must not lead to another limb, so the link is tried again. After
+ * that, or when it is refused, the next plan takes the next candidate (D-PRO-5). */
 static void on_request_end(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
 {
     run->requesting = false;

@@ -27,6 +27,7 @@ uint8_t profile_match_similarity(uint16_t type_a, uint16_t profile_a, uint16_t t
     return score;
 }
 
+/* Decides between channels that are equally alike (D-PRO-3). */
 bool profile_match_precedes(uint16_t profile, const pdcp_identity_t *owner, uint8_t index,
                             uint16_t than_profile, const pdcp_identity_t *than_owner, uint8_t than_index)
 {

@@ -43,6 +43,7 @@ static bool can_come_back(const profile_board_t *board)
     return board->want[input] != board->output || board->stand_in[board->at] != PDCP_NONE;
 }
 
+/* Looks at the next link of the configuration: it comes back if it can, and what stood in goes (D-PRO-6). */
 profile_phase_t profile_originals(profile_board_t *board)
 {
     if (board->at >= board->links->count) {
@@ -99,7 +100,8 @@ profile_phase_t profile_originals_link(profile_board_t *board)
     return PROFILE_PHASE_ORIGINALS_JUDGE;
 }
 
-/* Is the original linked with all that it requires, and has no other one lost that which it had? */
+/* Is the original linked with all that it requires, and has no other one lost that which it had
+ * (D-PRO-24)? */
 profile_phase_t profile_originals_judge(profile_board_t *board)
 {
     if (board->settle.spoilt) {

@@ -182,6 +182,7 @@ static bool is_ready(const profile_scene_t *scene, uint8_t place)
     return scene->tables->devices[place].state == PDCP_PLACE_READY;
 }
 
+/* A plan is made on the board alone, and is carried out when it is whole (D-PRO-5). */
 void profile_plan_begin(profile_board_t *board, const profile_scene_t *scene, uint8_t what)
 {
     memset(board, 0, sizeof *board);
@@ -195,6 +196,7 @@ void profile_plan_begin(profile_board_t *board, const profile_scene_t *scene, ui
     }
 }
 
+/* A device that has come or gone begins the plan again (D-PRO-23). */
 bool profile_plan_is_stale(const profile_board_t *board, const profile_scene_t *scene)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX; i++) {
@@ -205,6 +207,7 @@ bool profile_plan_is_stale(const profile_board_t *board, const profile_scene_t *
     return false;
 }
 
+/* A slice of the plan: units are done until the effort is used up (D-PRO-23). */
 bool profile_plan_step(profile_board_t *board, const profile_scene_t *scene, int16_t effort)
 {
     board->scene = scene;

@@ -24,8 +24,8 @@ static const profile_ref_t *broken_end(profile_board_t *board)
     return profile_scene_is_awaited(board->scene, missing) ? NULL : missing;
 }
 
-/* How alike the two ends would be with the best replacement, plus 1; 0: there is none. It may return
- * PROFILE_SEARCH_NOT_YET. */
+/* How alike the two ends would be with the best replacement, plus 1; 0: there is none. Which one is best says
+ * the missing channel alone (D-PRO-10). It may return PROFILE_SEARCH_NOT_YET. */
 static uint8_t repair_key(profile_board_t *board)
 {
     if (board->search.at == 0) {

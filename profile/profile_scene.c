@@ -2,6 +2,7 @@
 
 #include "profile_channel.h"
 
+/* A device that is being set up is away for a moment only (D-PRO-13). */
 bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t *end)
 {
     const uint8_t place = profile_links_place(scene->links, scene->tables, end);

@@ -47,6 +47,7 @@ static bool comes_before(const profile_board_t *board, const profile_ref_t *like
     return first != second ? first > second : profile_match_is_before(board->tables, a, b);
 }
 
+/* Keeps the better of two channels. One with another root component is no candidate (D-PRO-3). */
 void profile_search_compare(profile_board_t *board, const profile_ref_t *like, uint8_t channel)
 {
     if (board->search.best != PDCP_NONE) {
@@ -59,6 +60,7 @@ void profile_search_compare(profile_board_t *board, const profile_ref_t *like, u
     board->search.best = channel;
 }
 
+/* A search has its share of the comparisons that are left (D-PRO-17). */
 void profile_search_begin(profile_board_t *board)
 {
     board->search.left = (uint16_t)((PROFILE_PLAN_STEPS - board->steps) / PROFILE_PLAN_SHARE);

@@ -19,6 +19,7 @@ void profile_start_wait(profile_run_t *run, uint32_t now_ms)
     run->stirred_ms = now_ms;
 }
 
+/* The start-up waits for one device at least (D-PRO-18). */
 bool profile_start_is_pending(const profile_run_t *run)
 {
     for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_WAITING; i++) {
@@ -29,6 +30,7 @@ bool profile_start_is_pending(const profile_run_t *run)
     return false;
 }
 
+/* The time by which grants were held is taken off the quiet time (D-BUS-34). */
 uint32_t profile_start_ms(const profile_run_t *run, const pdcp_arb_t *arb)
 {
     const bool asked = pdcp_time_before(run->stirred_ms, arb->asked_ms);

@@ -7,7 +7,7 @@
 #include "profile_start.h"
 
 /* Makes a slice of the plan, or of a new one if what it is made from has changed. Nothing of a plan counts
- * before it is done. */
+ * before it is done (D-PRO-23). */
 static void make_slice(profile_run_t *run)
 {
     if (run->stale || profile_plan_is_stale(&run->plan, &run->scene)) {

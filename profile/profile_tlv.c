@@ -22,7 +22,7 @@ void profile_tlv_init(profile_tlv_t *reader, profile_tlv_on_link_t on_link, void
     reader->ctx = ctx;
 }
 
-/* Number of the bit that stands for an identity. */
+/* Number of the bit that stands for an identity; others may share it (D-BUS-53). */
 static uint8_t name_of(const pdcp_identity_t *identity)
 {
     const uint16_t hash = (uint16_t)(identity->vid * 31u + identity->pid * 7u + identity->sn);
@@ -53,7 +53,7 @@ static profile_tlv_status_t end_configuration(profile_tlv_t *reader)
     return reader->links_missing == 0 ? PROFILE_TLV_MORE : PROFILE_TLV_ERR_COUNT;
 }
 
-/* What may stand once in what it belongs to; within 0: it stands elsewhere. */
+/* What may stand once in what it belongs to (D-PRO-20); within 0: it stands elsewhere. */
 static profile_tlv_status_t declare(profile_tlv_t *reader, uint8_t within, uint8_t what)
 {
     if (within == 0) {
@@ -66,7 +66,7 @@ static profile_tlv_status_t declare(profile_tlv_t *reader, uint8_t within, uint8
     return PROFILE_TLV_MORE;
 }
 
-/* The number of a configuration or link, each once. */
+/* The number of a configuration or link, up to 255 and each once (D-PRO-20). */
 static profile_tlv_status_t take_number(uint8_t taken[PROFILE_TLV_SET_BYTES], uint16_t number)
 {
     if (number > 0xFFu) {
@@ -79,6 +79,7 @@ static profile_tlv_status_t take_number(uint8_t taken[PROFILE_TLV_SET_BYTES], ui
     return PROFILE_TLV_MORE;
 }
 
+/* There is no configuration 0 (D-PRO-20). */
 static profile_tlv_status_t begin_configuration(profile_tlv_t *reader, uint16_t value)
 {
     profile_tlv_status_t status = end_configuration(reader);
@@ -182,6 +183,7 @@ static profile_tlv_status_t read_entry(profile_tlv_t *reader, uint8_t code, uint
                                                                          : PROFILE_TLV_MORE;
 }
 
+/* The value behind the code has its least significant byte first (D-PRO-7). */
 profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *bytes, uint16_t len)
 {
     for (; len > 0 && reader->status == PROFILE_TLV_MORE; len--) {
@@ -195,6 +197,7 @@ profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *byte
     return (profile_tlv_status_t)reader->status;
 }
 
+/* Puts an entry, the least significant byte of its value first (D-PRO-7). */
 void profile_tlv_put(uint8_t bytes[PROFILE_TLV_ENTRY_BYTES], uint8_t code, uint16_t value)
 {
     bytes[0] = code;

@@ -11,6 +11,8 @@ static uint16_t mask_of(const profile_type_t *type)
     return (uint16_t)(0xFFFFu >> (12u - 4u * (type->size & 3u)));
 }
 
+/* Bit 0 is the most significant one (D-PRO-1). A float of any other size than 16 bits is refused
+ * (D-PRO-2). */
 bool profile_type_decode(uint16_t word, profile_type_t *type)
 {
     type->size = (uint8_t)(word >> SIZE_AT);

@@ -22,6 +22,7 @@ bool arb_call_wait(arb_call_t *call, uint16_t limit_ms)
     return true;
 }
 
+/* A request is given up 3 s after its first call (D-API-16). */
 uint8_t arb_call_outcome(arb_call_t *call)
 {
     const arb_turn_t *turn = &call->api->turn;
@@ -32,6 +33,7 @@ uint8_t arb_call_outcome(arb_call_t *call)
     return turn->ended ? arb_call_error(turn->status) : (uint8_t)ARB_PENDING;
 }
 
+/* Waits 2 s at most (D-API-6). */
 uint8_t arb_call_wait_ready(arb_call_t *call)
 {
     return arb_call_wait(call, ARB_HOST_NOT_READY_MS) ? ARB_PENDING : ARB_ERR_NOT_READY;
@@ -53,6 +55,7 @@ uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer)
     return profile_channel_is_ready(tables, number, transfer) ? number : PDCP_NONE;
 }
 
+/* What the host is told (D-API-4). */
 uint8_t arb_call_error(int8_t status)
 {
     switch (status) {

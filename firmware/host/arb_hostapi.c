@@ -10,7 +10,7 @@
 /* The longest failure answer, 230Fh. */
 enum { FAILURE_MAX = ARB_HOST_HEADER + ARB_RESET_RESULTS + ARB_HOST_CRC };
 
-/* [API 3.2], and the extension group. len: 0 where there is no payload. */
+/* [API 3.2], and the extension group (D-API-5). len: 0 where there is no payload. */
 static const arb_message_t messages[] = {
     {.id = ARB_MSG_SYSTEM_INFO, .handler = arb_hostbus_system_info},
     {.id = ARB_MSG_DEVICE_INFO, .len = 1, .handler = arb_hostbus_device_info},
@@ -84,6 +84,8 @@ static bool urgent_has_room(const arb_hostapi_t *api)
     return api->urgent_out.len <= ARB_URGENT_BYTES - FAILURE_MAX;
 }
 
+/* Holds a request for its turn. One too many (D-API-3), or one whose payload finds no room (D-API-9), is
+ * answered as busy at once. */
 static void accept(arb_hostapi_t *api, const arb_hostrx_request_t *request)
 {
     api->counters[ARB_HOSTAPI_REQUESTS]++;
@@ -95,7 +97,7 @@ static void accept(arb_hostapi_t *api, const arb_hostrx_request_t *request)
     }
     arb_hostrx_request_t *held = &api->held[api->held_count++];
     *held = *request;
-    if (held->error == ARB_ERR_CRC && !api->strict) {
+    if (held->error == ARB_ERR_CRC && !api->strict) { /* lenient (D-API-1) */
         held->error = ARB_OK;
     }
     memcpy(&api->held_bytes[api->held_used], &api->rx.bytes[ARB_HOST_HEADER], request->len);
@@ -145,6 +147,7 @@ static void drop_front(arb_hostapi_t *api)
     memset(&api->turn, 0, sizeof api->turn);
 }
 
+/* Looks up the devices of a request. What changes links waits for a running setup or plan (D-API-6). */
 static uint8_t check_arguments(arb_call_t *call, const arb_message_t *message)
 {
     const uint8_t *bytes = call->payload;
@@ -262,7 +265,7 @@ void arb_hostapi_on_host_gone(arb_hostapi_t *api)
     arb_hostrx_clear(&api->rx);
     for (uint8_t i = 0; i < api->held_count; i++) {
         if (api->held[i].id == ARB_MSG_EVENT_STREAM) {
-            api->held[i].error = ARB_ERR_NOT_READY; /* it would be the next host's */
+            api->held[i].error = ARB_ERR_NOT_READY; /* it would be the next host's (D-API-17) */
         }
     }
 }

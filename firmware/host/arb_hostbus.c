@@ -134,7 +134,7 @@ uint8_t arb_hostbus_set_parameter(arb_call_t *call)
 }
 
 /* Why there is no link to be made: an output whose device could not be set up because all node ids are given
- * out is one without a node id. */
+ * out is one without a node id (D-API-13). */
 static uint8_t error_of_ends(const arb_call_t *call)
 {
     const pdcp_tables_t *tables = &call->arb->bus.tables;
@@ -171,7 +171,7 @@ uint8_t arb_hostbus_configure_link(arb_call_t *call)
     return status == PDCP_OK ? arb_call_started(call) : arb_call_wait_ready(call);
 }
 
-/* To all devices: Suspend (with its time) or Release only [PDCP 3.2.4, 3.2.5]. */
+/* To all devices: Suspend (with its time) or Release only [PDCP 3.2.4, 3.2.5] (D-API-11). */
 static uint8_t broadcast(arb_call_t *call, uint8_t dlc, const uint8_t *data)
 {
     const uint8_t code = data[PDCP_RAW_CODE];

@@ -17,6 +17,7 @@ static uint8_t crc8_byte(uint8_t crc, uint8_t byte)
     return crc;
 }
 
+/* CRC8 of a header (D-API-1). */
 uint8_t arb_hostcodec_crc8(const uint8_t header[ARB_HOST_HEADER])
 {
     uint8_t crc = 0;
@@ -28,6 +29,7 @@ uint8_t arb_hostcodec_crc8(const uint8_t header[ARB_HOST_HEADER])
     return crc;
 }
 
+/* CRC16 of a payload (D-API-1). */
 uint16_t arb_hostcodec_crc16(const uint8_t *payload, uint16_t len)
 {
     uint16_t crc = 0xFFFF;

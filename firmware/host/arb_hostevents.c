@@ -7,8 +7,8 @@
 
 /* In the queue an event is its length, then what the message holds: kind, time, data. */
 
-/* Puts the beginning of an event into the queue. Returns where its len bytes of data go; NULL: it is not
- * wanted, or finds no room. */
+/* Puts the beginning of an event into the queue, of which frames get a part only (D-API-14). Returns where
+ * its len bytes of data go; NULL: it is not wanted, or finds no room. */
 static uint8_t *put(arb_hostevents_t *events, uint32_t now_ms, arb_event_kind_t kind, uint8_t len)
 {
     const uint8_t limit = kind == ARB_EVENT_FRAME ? ARB_EVENT_FRAMES : ARB_EVENT_QUEUE;
@@ -36,6 +36,7 @@ void arb_hostevents_set_mask(arb_hostevents_t *events, uint16_t mask)
     }
 }
 
+/* The host is gone, and the stream ends (D-API-14). */
 void arb_hostevents_end(arb_hostevents_t *events)
 {
     events->mask = 0;
@@ -89,6 +90,7 @@ static void put_state(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t 
     }
 }
 
+/* Kind 9: the channel and the parameter that differs (D-API-20). */
 static void put_audit(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                       const pdcp_event_t *event)
 {
@@ -116,6 +118,7 @@ void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, ui
     }
 }
 
+/* Only frames with 11-bit identifiers are events (D-API-14). */
 void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const can_frame_t *frame)
 {
     if (frame->kind != CAN_FRAME_BASE || frame->dlc > CAN_FRAME_DATA_MAX) {

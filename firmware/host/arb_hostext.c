@@ -1,3 +1,4 @@
+/* Messages 2401h to 2416h (D-API-5). */
 #include "arb_hostext.h"
 
 #include <string.h>
@@ -28,7 +29,7 @@ uint8_t arb_hostext_arbitrator_info(arb_call_t *call)
     return ARB_OK;
 }
 
-/* 2404h: flags; the event stream has a message of its own. */
+/* 2404h: flags; the event stream has a message of its own. Bits without a meaning are refused (D-API-13). */
 uint8_t arb_hostext_set_flags(arb_call_t *call)
 {
     const uint8_t flags = call->payload[0];
@@ -41,7 +42,7 @@ uint8_t arb_hostext_set_flags(arb_call_t *call)
     return ARB_OK;
 }
 
-/* 2407h: action, argument. One that takes too long goes on without the host. */
+/* 2407h: action, argument. One that takes too long goes on without the host (D-API-13). */
 uint8_t arb_hostext_action(arb_call_t *call)
 {
     arb_limb_t *limb = call->env->limb;
@@ -146,7 +147,7 @@ uint8_t arb_hostext_remove_link(arb_call_t *call)
         return ARB_ERR_CHANNEL;
     }
     if (!pdcp_arb_disconnect(call->arb, turn->channel)) {
-        return ARB_OK; /* like a link that is made twice */
+        return ARB_OK; /* like a link that is made twice (D-API-13) */
     }
     return arb_call_started(call);
 }
@@ -181,6 +182,7 @@ static void put_host_counters(arb_call_t *call)
     put_counters(call, api->events.counters, 1 + ARB_EVENT_KINDS);
 }
 
+/* Group 3: what the drivers have lost, 0 where they cannot know it (D-API-18). */
 static void put_driver_counters(arb_call_t *call)
 {
     const arb_port_t *port = call->env->port;

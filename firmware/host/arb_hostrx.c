@@ -23,7 +23,8 @@ static uint16_t next_sync(const arb_hostrx_t *rx, uint16_t at)
     return at;
 }
 
-/* Drops what was taken, and goes on to the next place, at from or behind it, where a message may begin. */
+/* Drops what was taken, and goes on to the next place, at from or behind it, where a message may begin
+ * (D-API-2). */
 static void hunt(arb_hostrx_t *rx, uint16_t from)
 {
     const uint16_t at = next_sync(rx, from);
@@ -73,7 +74,7 @@ typedef enum {
 
 /* The message at the front, of total bytes, has a wrong checksum. Nothing: another message begins inside, a
  * header with a right checksum, whose end may stand behind total. Open: the beginning of one, and it is not
- * all here yet. */
+ * all here yet (D-API-8). */
 static front_t look_inside(const arb_hostrx_t *rx, uint16_t total)
 {
     for (uint16_t at = next_sync(rx, 1); at < total; at = next_sync(rx, (uint16_t)(at + 1u))) {
@@ -132,6 +133,8 @@ static front_t look_at_front(arb_hostrx_t *rx, arb_hostrx_request_t *request)
     return rx->len < ARB_HOST_HEADER + size ? FRONT_OPEN : check(rx, request);
 }
 
+/* A header that is wrong, or whose message is overdue, is dropped, and the hunt goes on behind its first byte
+ * (D-API-2). */
 bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request)
 {
     hunt(rx, rx->taken);

@@ -25,7 +25,7 @@ typedef enum {
     PHASE_ADOPT /* the header is read back */
 } phase_t;
 
-/* What a memory without a good copy reads as. */
+/* What a memory without a good copy reads as (D-API-15). */
 static const uint8_t empty_string[PROFILE_TLV_FRAME_BYTES] = {
     PROFILE_TLV_CONFIGURATIONS, 0, 0, PROFILE_TLV_END, 0, 0};
 
@@ -214,6 +214,7 @@ arb_config_status_t arb_config_erase(arb_config_t *config, uint8_t number)
     return ARB_CONFIG_OK;
 }
 
+/* A piece out of order is refused, and leaves what is in (D-API-15). */
 arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, uint16_t total,
                                          const uint8_t *bytes, uint16_t len)
 {
@@ -385,7 +386,8 @@ static arb_config_status_t end_scan(arb_config_t *config)
     return ARB_CONFIG_OK;
 }
 
-/* Reads a string; what comes of it at its end. */
+/* Reads a string; what comes of it at its end. A new one gets its header only if it reads back as it was
+ * written, and nothing is built upon a stored one that is damaged (D-PRO-21). */
 static arb_config_status_t step_read(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t bytes[CONFIG_CHUNK];

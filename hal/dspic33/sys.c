@@ -52,7 +52,7 @@ void sys_start(void)
         sys_cause = SYS_RESET_BROWN_OUT;
     } else if ((flags & RCON_WDTO) != 0) {
         sys_cause = SYS_RESET_WATCHDOG;
-    } else if ((flags & (RCON_IOPUWR | RCON_CM)) != 0) {
+    } else if ((flags & (RCON_IOPUWR | RCON_CM)) != 0) { /* CM: a pin select register (D-MCU-4) */
         sys_cause = SYS_RESET_ILLEGAL;
     } else {
         sys_cause = (flags & RCON_SWR) != 0 ? SYS_RESET_SOFTWARE : SYS_RESET_PIN;
@@ -77,6 +77,7 @@ void sys_fail(sys_fault_kind_t kind)
     PART_RESET();
 }
 
+/* Every trap, and every interrupt without a handler of its own, comes here (D-MCU-7). */
 void PART_HANDLER _DefaultInterrupt(void)
 {
     sys_fail(SYS_FAULT_HANDLER);

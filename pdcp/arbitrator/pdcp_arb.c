@@ -37,7 +37,7 @@ static bool is_young(const pdcp_arb_t *arb)
     return pdcp_bus_age_ms(&arb->bus) < PDCP_YOUNG_MS;
 }
 
-/* A frame from an unknown id, or of an unknown device. True: there is something to be sent. */
+/* A frame from an unknown id, or of an unknown device (D-BUS-15). True: there is something to be sent. */
 static bool on_unknown(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
@@ -89,6 +89,8 @@ static bool is_from_device(uint8_t code)
     return is_in((code & PDCP_ANSWER) != 0 ? answers : requests, code);
 }
 
+/* A frame of a bound device. What is malformed or deprecated is counted by its cause, and not answered
+ * (D-BUS-4, D-BUS-5). */
 static void on_message(pdcp_arb_t *arb, uint8_t place, const can_frame_t *frame)
 {
     pdcp_msg_t msg;
@@ -185,6 +187,7 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
 
 /* --- Deadlines --- */
 
+/* Sends the beacon of the arbitrator, and waits for the next one (D-BUS-11). */
 static void send_beacon(pdcp_arb_t *arb)
 {
     (void)pdcp_bus_send_word(&arb->bus, PDCP_PRIORITY_HIGH, PDCP_NODE_BROADCAST, PDCP_BEACON, 0);
@@ -385,6 +388,8 @@ void pdcp_arb_withdraw_resets(pdcp_arb_t *arb, uint32_t now_ms)
 
 /* --- Links --- */
 
+/* An output never feeds an input of its own device (D-API-6). sole: nor a second input that wants it for
+ * itself (D-API-13). */
 static pdcp_status_t connect(pdcp_arb_t *arb, uint8_t output, uint8_t input, bool sole)
 {
     const pdcp_channel_t *channels = arb->bus.tables.channels;

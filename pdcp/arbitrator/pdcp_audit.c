@@ -105,6 +105,7 @@ static bool may_ask(pdcp_bus_t *bus, uint8_t place)
            pdcp_request_is_idle(bus, place);
 }
 
+/* A question is asked once (D-BUS-59). */
 static void ask(pdcp_bus_t *bus, uint8_t number, uint8_t kind)
 {
     const pdcp_channel_t *channel = &bus->tables.channels[number];
@@ -276,6 +277,7 @@ static void on_difference(pdcp_bus_t *bus, uint8_t number)
     }
 }
 
+/* Silence is no difference (D-BUS-59). A refusal is none either, and is not asked again (D-BUS-40). */
 void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 {
     const uint8_t number = bus->audit.asked;

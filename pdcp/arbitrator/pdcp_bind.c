@@ -5,6 +5,7 @@
 
 #include "pdcp_time.h"
 
+/* May a device or an output have this id (D-BUS-2)? */
 static bool is_node_id(uint8_t id)
 {
     return id >= PDCP_NODE_MIN && id <= PDCP_NODE_MAX;

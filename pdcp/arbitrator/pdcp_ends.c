@@ -66,6 +66,7 @@ void pdcp_ends_release(pdcp_bus_t *bus, uint8_t output)
     }
 }
 
+/* The channel has not answered yet: it is told again when nothing else is to be done (D-BUS-22). */
 void pdcp_ends_silence_again(pdcp_bus_t *bus, uint8_t number)
 {
     const pdcp_channel_t *channel = pdcp_ends_channel(bus, number);

@@ -54,6 +54,7 @@ void pdcp_host_end(pdcp_bus_t *bus, pdcp_host_request_t *host, pdcp_status_t sta
     bus->on_event(bus->event_ctx, bus->now_ms, &event);
 }
 
+/* The transfer is broken off where it is (D-API-16). */
 uint8_t pdcp_host_give_up(pdcp_bus_t *bus, pdcp_host_request_t *host)
 {
     uint8_t freed = PDCP_NONE;
@@ -156,6 +157,7 @@ void pdcp_host_limit_wait(pdcp_bus_t *bus, const pdcp_host_request_t *host)
     }
 }
 
+/* What has had no turn by now ends as busy (D-API-10). */
 void pdcp_host_on_deadline(pdcp_bus_t *bus, pdcp_host_request_t *host)
 {
     if (host->waiting) {

@@ -388,6 +388,7 @@ void pdcp_job_on_lost(pdcp_bus_t *bus, uint8_t place)
     }
 }
 
+/* The host waits no longer: its link is undone if it is half made (D-API-16). */
 uint8_t pdcp_job_give_up_request(pdcp_bus_t *bus)
 {
     pdcp_job_t *job = &bus->link.job;

@@ -265,7 +265,8 @@ void pdcp_life_on_request_deadline(pdcp_arb_t *arb, uint8_t place)
 
 /* --- Deadlines --- */
 
-/* A device is gone for good. It may still speak on its ids, where it cannot be heard now. */
+/* A device is gone for good. It may still speak on its ids, where it cannot be heard now: they count as
+ * heard (D-BUS-47). */
 static void forget(pdcp_arb_t *arb, uint8_t place)
 {
     const pdcp_device_entry_t *device = pdcp_arb_device(arb, place);

@@ -39,6 +39,7 @@ void pdcp_link_remove(pdcp_bus_t *bus, uint8_t input)
     pdcp_ends_note(bus, input, PDCP_TODO_REMOVE);
 }
 
+/* The channel is told to be silent until it answers (D-BUS-22). */
 void pdcp_link_silence(pdcp_bus_t *bus, uint8_t channel)
 {
     bus->tables.channels[channel].enabled = true;
@@ -101,6 +102,8 @@ void pdcp_link_on_update(pdcp_bus_t *bus, uint8_t place, uint8_t index)
     }
 }
 
+/* Inactive links are made whose ends are both there: those of this device, or all (PDCP_NONE) when one was
+ * not answered and is tried again (D-BUS-26). */
 void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t place)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX && !bus->link.planned; i++) {
@@ -120,6 +123,7 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t place)
     bus->link.due = true; /* an Update Data Channel may have waited for the end of the setup */
 }
 
+/* The links of a lost device become inactive: what its outputs fed is silenced (D-BUS-14). */
 void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t place)
 {
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
@@ -193,6 +197,7 @@ static void start_todo(pdcp_bus_t *bus, uint8_t number, pdcp_todo_t todo)
     }
 }
 
+/* Makes the link that was asked for. If it is there already, nothing is sent (D-API-6). */
 static void start_request(pdcp_bus_t *bus)
 {
     pdcp_channel_t *input = &bus->tables.channels[bus->link.requested_input];
@@ -207,7 +212,7 @@ static void start_request(pdcp_bus_t *bus)
     }
     if (bus->link.requested_sole &&
         pdcp_tables_rival(&bus->tables, bus->link.requested_output, bus->link.requested_input) != PDCP_NONE) {
-        pdcp_link_forget_request(bus, PDCP_ERR_SOLE); /* another link was made while this one waited */
+        pdcp_link_forget_request(bus, PDCP_ERR_SOLE); /* another link was made meanwhile (D-API-13) */
         return;
     }
     pdcp_ends_drop(input, PDCP_TODO_CONNECT | PDCP_ENDS_SILENCES); /* it begins with the input off */
@@ -261,6 +266,7 @@ bool pdcp_link_is_making(const pdcp_bus_t *bus)
     return bus->link.job.active && bus->link.job.kind == PDCP_TODO_CONNECT;
 }
 
+/* A job that silences a channel again is broken off for anything else (D-BUS-22). */
 void pdcp_link_step(pdcp_bus_t *bus)
 {
     if (bus->link.job.active && bus->link.job.kind == PDCP_TODO_AGAIN && has_work(bus)) {

@@ -327,7 +327,7 @@ bool pdcp_request_on_frame(pdcp_bus_t *bus, uint8_t place, const can_frame_t *fr
     if (is_parameter(request) && request->size > PDCP_RAW_CHANNEL && frame->dlc > PDCP_RAW_ANSWER_CHANNEL &&
         (frame->data[PDCP_RAW_ANSWER_PARAM] != request->param ||
          frame->data[PDCP_RAW_ANSWER_CHANNEL] != request->channel)) {
-        return false; /* well-formed, and about another parameter or channel */
+        return false; /* well-formed, and about another parameter or channel (D-API-11) */
     }
     pdcp_bus_count(bus, PDCP_STAT_TAKEN);
     reply_head(request, reply, frame->data, frame->dlc);
@@ -342,7 +342,7 @@ bool pdcp_request_on_deadline(pdcp_bus_t *bus, uint8_t place, pdcp_reply_t *repl
     if (request->state == PDCP_REQUEST_IDLE) {
         return false;
     }
-    if (request->state == PDCP_REQUEST_SET_ECHO) { /* no more answers come */
+    if (request->state == PDCP_REQUEST_SET_ECHO) { /* no more answers come (D-BUS-39) */
         enter(bus, device, PDCP_REQUEST_SET_DATA);
         return false;
     }

@@ -90,6 +90,7 @@ static bool is_to_yield(const pdcp_arb_t *arb)
 
 /* --- Frames of another arbitrator --- */
 
+/* A beacon that this arbitrator has not sent: there is a second one, and the host is told (D-BUS-12). */
 static void on_foreign_beacon(pdcp_arb_t *arb)
 {
     pdcp_bus_count(&arb->bus, PDCP_STAT_FOREIGN_BEACON);

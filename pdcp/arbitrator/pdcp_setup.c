@@ -61,7 +61,7 @@ static void pause(pdcp_bus_t *bus, const pdcp_device_entry_t *device, uint16_t p
     pdcp_bus_wake(bus, (uint8_t)(PDCP_TIMER_REQUEST + device->place), pause_ms);
 }
 
-/* The device is left bound but unlinked; reported once, and tried again from time to time. */
+/* The device is left bound but unlinked; reported once, and tried again from time to time (D-BUS-17). */
 static void give_up(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->state = PDCP_PLACE_FAILED;
@@ -73,7 +73,8 @@ static void give_up(pdcp_bus_t *bus, pdcp_device_entry_t *device)
     }
 }
 
-/* The step has failed: the same again after a pause, so that on a bad line what is done stays done. */
+/* The step has failed: the same again after a pause, so that on a bad line what is done stays done
+ * (D-BUS-17). */
 static void fail(pdcp_bus_t *bus, pdcp_device_entry_t *device)
 {
     device->setup_attempts++;
@@ -173,6 +174,7 @@ static uint16_t clamp(uint16_t value, uint16_t low, uint16_t high)
     return value > high ? high : value;
 }
 
+/* Both times are kept within their limits (D-BUS-13). */
 void pdcp_setup_take_time(pdcp_device_entry_t *device, uint8_t param, uint16_t time_ms)
 {
     if (param == PDCP_DEV_ACK_TIME) {

@@ -87,7 +87,8 @@ static bool is_enabling(const pdcp_job_t *job)
     return (job->step == PDCP_STEP_INPUT_ON || job->step == PDCP_STEP_OUTPUT_ON) && !job->undoing;
 }
 
-/* Has the current step something to write to this channel? */
+/* Has the current step something to write to this channel? Only a link that is written again writes the
+ * output's node id once more before it enables the output (D-BUS-57). */
 static bool has_value(const pdcp_job_t *job, const pdcp_channel_t *channel)
 {
     switch ((pdcp_step_t)job->step) {

@@ -146,6 +146,7 @@ void pdcp_tables_remove(pdcp_tables_t *tables, uint8_t place)
     clear_place(gone, place);
 }
 
+/* The input is unconnected (D-BUS-7). */
 void pdcp_tables_clear_source(pdcp_channel_t *input)
 {
     input->source.identity.vid = PDCP_NO_SOURCE_WORD;
@@ -281,11 +282,13 @@ static uint16_t set_at(const pdcp_device_entry_t *owner, const pdcp_channel_t *c
     return (uint16_t)(owner->needs_at + set * owner->needs_stride);
 }
 
+/* Bit strings begin with the most significant bit (D-BUS-8). */
 static uint8_t mask_of(uint16_t bit)
 {
     return (uint8_t)(0x80u >> (bit % 8u));
 }
 
+/* The bits of the device's inputs are packed together; all others are dropped (D-BUS-13). */
 void pdcp_tables_put_needs(pdcp_tables_t *tables, uint8_t channel, bool desired, uint16_t offset,
                            const uint8_t *bytes, uint16_t len)
 {
@@ -334,6 +337,7 @@ static uint8_t link_to(const pdcp_tables_t *tables, const pdcp_channel_t *input,
     return input->link;
 }
 
+/* An inactive link counts as well, but less than an active one (D-API-13). */
 uint8_t pdcp_tables_rival(const pdcp_tables_t *tables, uint8_t output, uint8_t input)
 {
     const pdcp_channel_t *asked = &tables->channels[input];
@@ -348,7 +352,8 @@ uint8_t pdcp_tables_rival(const pdcp_tables_t *tables, uint8_t output, uint8_t i
     return PDCP_NONE;
 }
 
-/* Does this device, or do its channels, count for the host? Links count whatever becomes of their devices. */
+/* Does this device, or do its channels, count for the host? A device counts from its first beacon, its
+ * channels from the end of its setup (D-API-6), and links whatever becomes of their devices. */
 static bool counts(const pdcp_device_entry_t *device, uint8_t kind)
 {
     if (kind == PDCP_COUNTS_LINK) {

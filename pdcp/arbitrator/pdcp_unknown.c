@@ -90,6 +90,7 @@ void pdcp_unknown_note_answer(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t 
     pdcp_bit_set(unknown->answered, id, is_told(unknown, id));
 }
 
+/* The time of the Reset is rounded up to a whole tick (D-BUS-47). */
 bool pdcp_unknown_tell(pdcp_unknown_t *unknown, uint32_t now_ms, uint8_t id)
 {
     pdcp_unknown_on_time(unknown, now_ms);

@@ -1,5 +1,6 @@
 #include "pdcp_bytes.h"
 
+/* The least significant byte comes first, here and below (D-BUS-1). */
 uint16_t pdcp_bytes_get_u16(const uint8_t bytes[2])
 {
     return (uint16_t)(bytes[0] | (uint16_t)((uint16_t)bytes[1] << 8));

@@ -95,6 +95,7 @@ static void take_fields(uint8_t fields, const uint8_t *at, const uint8_t *end, p
     }
 }
 
+/* The layout of its code decides whether a frame is malformed (D-BUS-5). */
 pdcp_decode_t pdcp_codec_decode(const can_frame_t *frame, pdcp_msg_t *msg)
 {
     memset(msg, 0, sizeof *msg);
@@ -112,7 +113,7 @@ pdcp_decode_t pdcp_codec_decode(const can_frame_t *frame, pdcp_msg_t *msg)
     if (frame->dlc > 1) {
         take_fields(layout->fields, &frame->data[1], &frame->data[frame->dlc], msg);
     } else if ((layout->fields & RESULT) != 0) {
-        msg->result = PDCP_SUCCESS;
+        msg->result = PDCP_SUCCESS; /* D-BUS-18 */
     }
     return PDCP_DECODE_OK;
 }

@@ -16,7 +16,8 @@ enum {
 
 /* --- sending --- */
 
-/* A full queue or a channel that may not send: the caller hears it, the bus does not. */
+/* A full queue or a channel that may not send: the caller hears it, the bus does not. Only enabled outputs of
+ * a bound device may (D-BUS-16). */
 static bool may_send(const pdcp_device_t *dev, uint32_t now_ms, uint8_t channel)
 {
     if (dev->state != PDCP_DEVICE_BOUND || channel == 0 || channel > dev->desc->channel_count ||
@@ -190,6 +191,7 @@ static void on_late_answer(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t
     dev->stats.drop_late++;
 }
 
+/* Counted, and not answered (D-BUS-4). */
 static void on_deprecated(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg)
 {
     (void)now_ms;
@@ -237,6 +239,7 @@ static void dispatch(pdcp_device_t *dev, uint32_t now_ms, const pdcp_msg_t *msg,
     dev->stats.drop_direction++;
 }
 
+/* A malformed frame is counted by its cause, and not answered (D-BUS-5). */
 static bool decode(pdcp_device_t *dev, const can_frame_t *frame, pdcp_msg_t *msg)
 {
     switch (pdcp_codec_decode(frame, msg)) {
@@ -275,7 +278,7 @@ static void on_arbitrator(pdcp_device_t *dev, uint32_t now_ms, const can_frame_t
     }
 }
 
-/* Channel data: taken by every enabled input that names this node id in parameter 7. */
+/* Channel data: taken by every enabled input that names this node id in parameter 7 (D-BUS-16). */
 static void on_data(pdcp_device_t *dev, const can_frame_t *frame)
 {
     const uint8_t node = pdcp_id_node(frame->id);
@@ -355,6 +358,7 @@ static uint32_t step_alone(pdcp_device_t *dev, uint32_t now_ms)
     return step_beacon(dev, now_ms);
 }
 
+/* A bound device beacons and asks for its sources until no arbitrator was heard for too long (D-BUS-16). */
 static uint32_t step_bound(pdcp_device_t *dev, uint32_t now_ms)
 {
     const uint32_t silence_ms = dev->heard_ms + PDCP_DEVICE_SILENCE_MS;
@@ -384,6 +388,7 @@ uint32_t pdcp_device_step(pdcp_device_t *dev, uint32_t now_ms)
 
 /* --- start and readers --- */
 
+/* An input without a source (D-BUS-7). */
 static void unconnect(pdcp_device_source_t *source)
 {
     memset(source, 0, sizeof *source);

@@ -39,7 +39,7 @@ static void ask_for(pdcp_device_t *dev, uint32_t now_ms, uint8_t id)
     dev->bind_deadline_ms = now_ms + dev->bind_pause_ms + next_random(dev) % (dev->bind_pause_ms / 4 + 1);
 }
 
-/* Asks for the last id, or for a random one. */
+/* Asks for the last id, or for a random one, with longer and longer pauses (D-BUS-16). */
 static void ask_again(pdcp_device_t *dev, uint32_t now_ms)
 {
     const uint8_t random_id = (uint8_t)(PDCP_NODE_MIN + next_random(dev) % PDCP_NODE_MAX);

@@ -326,7 +326,7 @@ static void plan_for_host(arb_limb_t *limb, uint8_t what, bool clear)
     if (clear) {
         profile_active_load_begin(&limb->run, false);
     }
-    if (limb->run.state == PROFILE_WAITING) {
+    if (limb->run.state == PROFILE_RUN_WAITING) {
         end(limb, ARB_OK);
         return;
     }
@@ -416,8 +416,8 @@ static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb)
  * limb. */
 static bool may_auto_save(const arb_limb_t *limb)
 {
-    return limb->unsaved && limb->stage == STAGE_IDLE && limb->run.state == PROFILE_RUNNING &&
-           !profile_run_is_busy(&limb->run) && (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0;
+    return limb->unsaved && limb->stage == STAGE_IDLE && limb->run.state == PROFILE_RUN_IDLE &&
+           limb->run.due == 0 && (arb_limb_flags(limb) & ARB_FLAG_AUTO_SAVE) != 0;
 }
 
 static void auto_save(arb_limb_t *limb, uint32_t now_ms)
@@ -445,7 +445,7 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
         begin_start(limb, arb);
     }
     const bool handed = profile_step(&limb->run, arb, now_ms);
-    if (limb->stage == STAGE_PLAN && limb->run.state != PROFILE_CONFIGURING) {
+    if (limb->stage == STAGE_PLAN && profile_run_status(&limb->run) != PROFILE_CONFIGURING) {
         limb->result = limb->run.moves;
         end(limb, limb->error);
     }

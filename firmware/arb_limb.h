@@ -94,7 +94,7 @@ static inline uint8_t arb_limb_flags(const arb_limb_t *limb)
 /* Profile state of 2401h. */
 static inline uint8_t arb_limb_state(const arb_limb_t *limb)
 {
-    return limb->run.state;
+    return (uint8_t)profile_run_status(&limb->run);
 }
 
 /* True, once: the active configuration or the stored ones are not what they were (event 4). */

@@ -20,13 +20,13 @@ uint8_t profile_active_stood_in_for(const profile_run_t *run, uint8_t input)
 
 static bool store_link(profile_run_t *run, const profile_link_t *link, bool by_host)
 {
-    run->stale = true;
+    profile_run_note_change(run);
     return profile_links_put(&run->links, link, by_host);
 }
 
 void profile_active_remove(profile_run_t *run, uint8_t entry)
 {
-    run->stale = true;
+    profile_run_note_change(run);
     profile_links_remove(&run->links, entry);
 }
 

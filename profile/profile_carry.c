@@ -136,38 +136,33 @@ static uint8_t next_input(const profile_run_t *run)
     return found;
 }
 
-/* The plan is carried out: all links that it wants are made, or their ends have gone. */
-static void end_plan(profile_run_t *run)
+/* Asks for the link of an input. If it cannot be asked for, a device has changed its channels meanwhile. */
+static profile_run_state_t begin_link(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
-    run->state = PROFILE_RUNNING;
-    run->what = 0;
-    memset(run->scene.made, 0, sizeof run->scene.made);
-    (void)profile_active_take_up(run);
-}
-
-/* Carries out a plan that is whole: takes links away, then makes them one by one (D-PRO-5). */
-bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms)
-{
-    if (!pdcp_arb_links_settled(arb)) {
-        return false;
-    }
-    unlink_all(run, arb, now_ms);
-    if (!pdcp_arb_links_settled(arb)) {
-        return true;
-    }
-    if (deactivate_lacking(run, arb, now_ms)) {
-        return true;
-    }
-    const uint8_t input = next_input(run);
-    if (input == PDCP_NONE) {
-        end_plan(run);
-        return false;
-    }
     run->request.input = input;
     run->request.output = run->plan.want[input];
-    run->requesting = pdcp_arb_connect(arb, run->request.output, input) == PDCP_OK;
-    if (!run->requesting) { /* a device has changed its channels meanwhile */
-        profile_run_stir(run, now_ms);
+    if (pdcp_arb_connect(arb, run->request.output, input) == PDCP_OK) {
+        return PROFILE_RUN_LINKING;
     }
-    return true;
+    profile_run_stir(run, now_ms, PROFILE_AT_ONCE);
+    return PROFILE_RUN_CARRYING_OUT;
+}
+
+profile_run_state_t profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, bool *handed)
+{
+    if (!pdcp_arb_links_settled(arb)) {
+        return PROFILE_RUN_CARRYING_OUT;
+    }
+    unlink_all(run, arb, now_ms);
+    if (!pdcp_arb_links_settled(arb) || deactivate_lacking(run, arb, now_ms)) {
+        *handed = true;
+        return PROFILE_RUN_CARRYING_OUT;
+    }
+    const uint8_t input = next_input(run);
+    if (input == PDCP_NONE) { /* all links are made, or their ends have gone */
+        (void)profile_active_take_up(run);
+        return PROFILE_RUN_IDLE;
+    }
+    *handed = true;
+    return begin_link(run, arb, now_ms, input);
 }

@@ -9,8 +9,8 @@
 #include "pdcp_arb.h"
 #include "profile_run.h"
 
-/* Does the next thing that the plan says, once what came before is done. The plan must be made. True: the
- * arbitrator was given something to do. */
-bool profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms);
+/* States PLANNED and CARRYING_OUT: does the next thing that the plan says, once what came before is done.
+ * Returns the next state. *handed becomes true if the arbitrator was given something to do. */
+profile_run_state_t profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, bool *handed);
 
 #endif

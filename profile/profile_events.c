@@ -9,21 +9,19 @@
 /* A device has come. Without a stored configuration the sources that it names count (D-PRO-6, D-PRO-19). */
 static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t place)
 {
-    const bool urgent = run->urgent;
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) { /* it was away: nothing is being taken away any more */
         if (run->scene.tables->channels[i].place == place) {
             pdcp_bit_set(run->dropping, i, false);
         }
     }
     pdcp_bit_set(run->scene.awaited, place, false);
-    if (run->state != PROFILE_WAITING && !arb->bus.link.stored) {
+    if (run->state != PROFILE_RUN_WAITING && !arb->bus.link.stored) {
         profile_active_read_back(run, place);
     }
     if (run->due == 0) {
         run->arrival_ms = now_ms + PROFILE_ARRIVAL_MS;
     }
-    profile_run_stir(run, now_ms);
-    run->urgent = urgent;
+    profile_run_stir(run, now_ms, PROFILE_AFTER_SETUPS);
 }
 
 /* The host has reset a device, which will be back in a moment. */
@@ -59,7 +57,7 @@ static void on_broken(profile_run_t *run, uint8_t input)
         profile_channel_is_ready(tables, tables->channels[input].source.channel, PDCP_OUTPUT)) {
         run->tries = 1;
     }
-    profile_run_make_due(run, run->at_events);
+    profile_run_make_due(run, run->at_events, PROFILE_AT_ONCE);
 }
 
 /* A link that this layer has asked for was made or has failed. An answer may be missing on a bad line, or
@@ -67,7 +65,8 @@ static void on_broken(profile_run_t *run, uint8_t input)
  * that, or when it is refused, the next plan takes the next candidate (D-PRO-5). */
 static void on_request_end(profile_run_t *run, uint32_t now_ms, pdcp_status_t status)
 {
-    run->requesting = false;
+    profile_run_enter(run,
+                      run->state == PROFILE_RUN_LINKING ? PROFILE_RUN_CARRYING_OUT : PROFILE_RUN_TO_PLAN);
     if (status == PDCP_OK) {
         run->tries = 0;
         pdcp_bit_set(run->scene.made, run->request.input, true);
@@ -82,7 +81,7 @@ static void on_request_end(profile_run_t *run, uint32_t now_ms, pdcp_status_t st
     if (status != PDCP_ERR_NO_ANSWER || run->tries == PROFILE_TRIES_MAX) {
         ban(run, now_ms, run->request);
     }
-    profile_run_make_due(run, run->what);
+    profile_run_make_due(run, run->what, PROFILE_AT_ONCE);
 }
 
 /* A link that the host has asked for was made or has failed. What was inactive for lack of it comes back. */
@@ -90,14 +89,14 @@ static void on_hosts_request_end(profile_run_t *run, const pdcp_event_t *event)
 {
     if (event->status == PDCP_OK) {
         (void)profile_active_adopt(run, event->channel, true);
-        profile_run_make_due(run, PROFILE_PLAN_ORIGINALS);
+        profile_run_make_due(run, PROFILE_PLAN_ORIGINALS, PROFILE_AT_ONCE);
     }
 }
 
 /* Does the working link of an input differ from what the plan knows or wants? */
 static bool is_unexpected(const profile_run_t *run, uint8_t input)
 {
-    return run->making == PROFILE_MAKING
+    return profile_run_is_planning(run)
                ? profile_plan_links_differ(&run->plan, &run->scene)
                : run->scene.tables->channels[input].source.channel != run->plan.want[input];
 }
@@ -114,7 +113,7 @@ static void on_asked(profile_run_t *run, uint8_t input, uint8_t entry)
     if (channel->link == PDCP_LINK_ACTIVE && is_unexpected(run, input)) {
         pdcp_bit_set(run->scene.made, input,
                      profile_channel_breaks_sole_access(tables, channel->source.channel, input));
-        profile_run_make_due(run, run->at_events);
+        profile_run_make_due(run, run->at_events, PROFILE_AT_ONCE);
     }
 }
 
@@ -127,7 +126,7 @@ static void on_removed(profile_run_t *run, uint8_t input, uint8_t entry)
         profile_active_remove(run, entry);
         run->changed = true;
     }
-    profile_run_make_due(run, PROFILE_PLAN_SETTLE);
+    profile_run_make_due(run, PROFILE_PLAN_SETTLE, PROFILE_AT_ONCE);
 }
 
 /* The audit has let the link of an input go. The pair is left out like one that could not be linked
@@ -138,7 +137,7 @@ static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
     const profile_pair_t pair = {.output = run->scene.tables->channels[input].source.channel, .input = input};
     run->plan.want[input] = PDCP_NONE;
     ban(run, now_ms, pair);
-    profile_run_make_due(run, PROFILE_PLAN_SETTLE);
+    profile_run_make_due(run, PROFILE_PLAN_SETTLE, PROFILE_AT_ONCE);
 }
 
 /* Has a link that the finished plan wants stopped working? It is not broken while it is about to be made
@@ -146,7 +145,7 @@ static void on_let_go(profile_run_t *run, uint32_t now_ms, uint8_t input)
 static bool is_broken(const profile_run_t *run, uint8_t input)
 {
     const pdcp_channel_t *channel = &run->scene.tables->channels[input];
-    return run->state == PROFILE_RUNNING && run->plan.want[input] != PDCP_NONE &&
+    return run->state == PROFILE_RUN_IDLE && run->plan.want[input] != PDCP_NONE &&
            channel->link != PDCP_LINK_ACTIVE && (channel->todo & PDCP_TODO_CONNECT) == 0;
 }
 
@@ -167,8 +166,8 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
         on_removed(run, input, entry);
     } else if (is_broken(run, input)) {
         on_broken(run, input);
-    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_WAITING && !arb->bus.link.stored &&
-               !run->requesting) {
+    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_RUN_WAITING && !arb->bus.link.stored &&
+               !profile_run_is_linking(run)) {
         on_asked(run, input, entry);
     }
 }
@@ -182,13 +181,13 @@ void profile_events_take(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now
         break;
     case PDCP_EVENT_SETUP_FAILED:
     case PDCP_EVENT_LOST:
-        profile_run_stir(run, now_ms);
+        profile_run_stir(run, now_ms, PROFILE_AT_ONCE);
         break;
     case PDCP_EVENT_RESET:
         on_reset(run, now_ms, event);
         break;
     case PDCP_EVENT_LINK_REQUEST:
-        if (run->requesting) {
+        if (profile_run_is_linking(run)) {
             on_request_end(run, now_ms, (pdcp_status_t)event->status);
         } else {
             on_hosts_request_end(run, event);

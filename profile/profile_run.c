@@ -14,22 +14,50 @@ void profile_run_init(profile_run_t *run, const pdcp_tables_t *tables, uint32_t 
 
 bool profile_run_is_busy(const profile_run_t *run)
 {
-    return run->state == PROFILE_CONFIGURING || run->due != 0;
+    return profile_run_status(run) == PROFILE_CONFIGURING || run->due != 0;
 }
 
-void profile_run_make_due(profile_run_t *run, uint8_t what)
+void profile_run_enter(profile_run_t *run, profile_run_state_t state)
 {
-    if (run->state != PROFILE_WAITING) {
-        run->due |= what;
-        run->urgent = true;
+    run->state = (uint8_t)state;
+    if (state == PROFILE_RUN_IDLE) {
+        run->what = 0;
+        memset(run->scene.made, 0, sizeof run->scene.made);
     }
 }
 
-void profile_run_stir(profile_run_t *run, uint32_t now_ms)
+bool profile_run_is_planning(const profile_run_t *run)
+{
+    return run->state == PROFILE_RUN_TO_PLAN || run->state == PROFILE_RUN_PLANNING;
+}
+
+bool profile_run_is_linking(const profile_run_t *run)
+{
+    return run->state == PROFILE_RUN_LINKING || run->state == PROFILE_RUN_LINKING_LAST;
+}
+
+void profile_run_note_change(profile_run_t *run)
+{
+    if (run->state == PROFILE_RUN_PLANNING) {
+        profile_run_enter(run, PROFILE_RUN_TO_PLAN);
+    }
+}
+
+void profile_run_make_due(profile_run_t *run, uint8_t what, profile_urgency_t urgency)
+{
+    if (run->state != PROFILE_RUN_WAITING) {
+        run->due |= what;
+        if (urgency == PROFILE_AT_ONCE) {
+            run->urgency = PROFILE_AT_ONCE;
+        }
+    }
+}
+
+void profile_run_stir(profile_run_t *run, uint32_t now_ms, profile_urgency_t urgency)
 {
     run->stirred_ms = now_ms;
     run->scene.banned_count = 0;
-    profile_run_make_due(run, run->at_events);
+    profile_run_make_due(run, run->at_events, urgency);
 }
 
 /* Links that the plan under way was about to take away do not count as working for the next one. It would not
@@ -44,16 +72,21 @@ static void leave_unwanted(profile_run_t *run)
     }
 }
 
+/* Is there a plan that is made, and not carried out to its end? */
+static bool has_plan(const profile_run_t *run)
+{
+    return run->state == PROFILE_RUN_PLANNED || run->state == PROFILE_RUN_CARRYING_OUT ||
+           run->state == PROFILE_RUN_LINKING;
+}
+
 static void begin_plan(profile_run_t *run)
 {
-    if (run->state == PROFILE_CONFIGURING && run->making != PROFILE_MAKING) {
+    if (has_plan(run)) {
         leave_unwanted(run);
     }
-    run->state = PROFILE_CONFIGURING;
     run->due = 0;
-    run->urgent = false;
-    run->making = PROFILE_MAKING;
-    run->stale = true;
+    run->urgency = PROFILE_AFTER_SETUPS;
+    profile_run_enter(run, profile_run_is_linking(run) ? PROFILE_RUN_LINKING_LAST : PROFILE_RUN_TO_PLAN);
 }
 
 /* Only links that the host has made count as working, so that all others are planned again. */

@@ -12,17 +12,16 @@ void profile_start_wait(profile_run_t *run, uint32_t now_ms)
     }
     memset(run->dropping, 0, sizeof run->dropping);
     memset(run->scene.awaited, 0, sizeof run->scene.awaited);
-    run->state = PROFILE_WAITING;
+    profile_run_enter(run, PROFILE_RUN_WAITING);
     run->due = 0;
-    run->making = PROFILE_NOT_MAKING;
-    run->requesting = false;
+    run->urgency = PROFILE_AFTER_SETUPS;
     run->stirred_ms = now_ms;
 }
 
 /* The start-up waits for one device at least (D-PRO-18). */
 bool profile_start_is_pending(const profile_run_t *run)
 {
-    for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_WAITING; i++) {
+    for (uint8_t i = 0; i < PDCP_DEVICES_MAX && run->state == PROFILE_RUN_WAITING; i++) {
         if (run->scene.tables->devices[i].state == PDCP_PLACE_READY) {
             return true;
         }

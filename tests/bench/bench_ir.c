@@ -203,7 +203,7 @@ static void do_profile_start(job_t *job, uint32_t count)
     for (uint32_t i = 0; i < count; i++) {
         profile_start_begin(&job->app->limb.run, &job->app->arb, false);
     }
-    check(job->app->limb.run.state == PROFILE_CONFIGURING, "no plan was begun");
+    check(job->app->limb.run.state == PROFILE_RUN_TO_PLAN, "no plan was begun");
 }
 
 typedef struct {

@@ -444,7 +444,7 @@ static void test_a_link_without_its_source_is_listed(void)
 static void test_the_start_up_waits_for_a_part(void)
 {
     limb_run_ms(&limb, 3000);
-    TEST_ASSERT_EQUAL(PROFILE_WAITING, limb.app.limb.run.state);
+    TEST_ASSERT_EQUAL(PROFILE_WAITING, arb_limb_state(&limb.app.limb));
     limb_want(&limb, LINKS);
     limb_plug(&limb, D1, D3);
     limb_await(&limb, 1000);

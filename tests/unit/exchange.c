@@ -82,7 +82,8 @@ void exchange_step(exchange_t *x)
     if (x->app != NULL) {
         do {
             (void)arb_app_step(x->app, x->now_ms);
-        } while (x->app->limb.run.making); /* a plan takes several steps */
+        } while (profile_run_is_planning(&x->app->limb.run) ||
+                 x->app->limb.run.state == PROFILE_RUN_PLANNED); /* a plan takes several steps */
     } else {
         (void)pdcp_arb_step(x->arb, x->now_ms);
     }

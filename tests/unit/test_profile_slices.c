@@ -37,7 +37,7 @@ void setUp(void)
         systems_set_up(&s, systems_bind(&s, &device), &device);
     }
     app.arb.bus.tables = s.tables;
-    app.limb.run.state = PROFILE_RUNNING;
+    app.limb.run.state = PROFILE_RUN_IDLE;
     app.limb.run.at_events = PROFILE_PLAN_ALL;
 }
 
@@ -48,8 +48,7 @@ static void make_slices(int count)
 {
     for (int i = 0; i < count; i++) {
         (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
-        TEST_ASSERT_EQUAL(PROFILE_MAKING, app.limb.run.making);
-        TEST_ASSERT_FALSE(app.limb.run.requesting);
+        TEST_ASSERT_EQUAL(PROFILE_RUN_PLANNING, app.limb.run.state);
         TEST_ASSERT_EQUAL_UINT32(x.now_ms, profile_step_next_ms(&app.limb.run, &app.arb, x.now_ms));
     }
 }
@@ -61,9 +60,8 @@ static int finish_plan(void)
     do {
         TEST_ASSERT_LESS_THAN(SLICES_MAX, ++slices);
         (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
-    } while (app.limb.run.making == PROFILE_MAKING);
-    TEST_ASSERT_EQUAL(PROFILE_JUST_MADE, app.limb.run.making);
-    TEST_ASSERT_FALSE(app.limb.run.requesting);
+    } while (profile_run_is_planning(&app.limb.run));
+    TEST_ASSERT_EQUAL(PROFILE_RUN_PLANNED, app.limb.run.state);
     return slices;
 }
 
@@ -92,7 +90,7 @@ static void test_a_plan_that_nothing_disturbs(void)
     TEST_ASSERT_GREATER_THAN(10, finish_plan());
     expect_plan_of_the_tables();
     (void)profile_step(&app.limb.run, &app.arb, x.now_ms);
-    TEST_ASSERT_TRUE(app.limb.run.requesting); /* and then it is carried out */
+    TEST_ASSERT_EQUAL(PROFILE_RUN_LINKING, app.limb.run.state); /* and then it is carried out */
 }
 
 /* A device goes when half of the plan is made: nothing of it is wanted any more, nobody is linked to it. */

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_time.h"
 #include "profile_active.h"
 #include "profile_channel.h"
@@ -341,6 +342,7 @@ bool arb_limb_is_starting(const arb_limb_t *limb)
 uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
 {
     uint8_t what = PROFILE_PLAN_ENFORCE;
+    pdcp_assert(!arb_limb_is_busy(limb), "arb_limb.h: nothing is under way");
     limb->ended = false;
     limb->error = ARB_OK;
     limb->result = 0;

@@ -1,5 +1,6 @@
 #include "profile_active.h"
 
+#include "pdcp_assert.h"
 #include "profile_channel.h"
 #include "profile_match.h"
 
@@ -20,12 +21,14 @@ uint8_t profile_active_stood_in_for(const profile_run_t *run, uint8_t input)
 
 static bool store_link(profile_run_t *run, const profile_link_t *link, bool by_host)
 {
+    pdcp_assert(!run->frozen, "profile_run.h: the configuration may change");
     profile_run_note_change(run);
     return profile_links_put(&run->links, link, by_host);
 }
 
 void profile_active_remove(profile_run_t *run, uint8_t entry)
 {
+    pdcp_assert(!run->frozen, "profile_run.h: the configuration may change");
     profile_run_note_change(run);
     profile_links_remove(&run->links, entry);
 }

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "profile_channel.h"
 
 uint8_t profile_board_entry_of(profile_board_t *board, uint8_t input)
@@ -72,6 +73,9 @@ void profile_board_set_source(profile_board_t *board, uint8_t input, uint8_t out
 bool profile_board_may_link(const profile_board_t *board, uint8_t output, uint8_t input)
 {
     const pdcp_channel_t *to = profile_board_channel(board, input);
+    pdcp_assert(profile_channel_is_ready(board->tables, output, PDCP_OUTPUT) &&
+                    profile_channel_is_ready(board->tables, input, PDCP_INPUT),
+                "profile_board.h: both ends are set up");
     if (profile_scene_is_banned(board->scene, output, input) ||
         (profile_channel_is_sole(to) && pdcp_bit(board->taken, output))) {
         return false;

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "profile_active.h"
 #include "profile_channel.h"
 
@@ -150,6 +151,8 @@ static profile_run_state_t begin_link(profile_run_t *run, pdcp_arb_t *arb, uint3
 
 profile_run_state_t profile_carry_on(profile_run_t *run, pdcp_arb_t *arb, uint32_t now_ms, bool *handed)
 {
+    pdcp_assert(run->state == PROFILE_RUN_PLANNED || run->state == PROFILE_RUN_CARRYING_OUT,
+                "profile_carry.h: the plan is made");
     if (!pdcp_arb_links_settled(arb)) {
         return PROFILE_RUN_CARRYING_OUT;
     }

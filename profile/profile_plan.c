@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "profile_connect.h"
 #include "profile_originals.h"
 #include "profile_repair.h"
@@ -210,6 +211,8 @@ bool profile_plan_is_stale(const profile_board_t *board, const profile_scene_t *
 /* A slice of the plan: units are done until the effort is used up (D-PRO-23). */
 bool profile_plan_step(profile_board_t *board, const profile_scene_t *scene, int16_t effort)
 {
+    pdcp_assert(!profile_plan_is_stale(board, scene),
+                "profile_plan.h: the tables are those of the beginning");
     board->scene = scene;
     board->tables = scene->tables;
     board->links = scene->links;

@@ -1,7 +1,10 @@
 #include "pdcp_bus.h"
 
+#include "pdcp_assert.h"
+
 pdcp_device_entry_t *pdcp_bus_device(pdcp_bus_t *bus, uint8_t place)
 {
+    pdcp_assert(place < PDCP_DEVICES_MAX, "pdcp_bus.h: the place is a device's");
     return &bus->tables.devices[place];
 }
 

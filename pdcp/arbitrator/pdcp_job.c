@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_bind.h"
 #include "pdcp_ends.h"
 #include "pdcp_step.h"
@@ -370,6 +371,7 @@ void pdcp_job_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply)
 
 void pdcp_job_on_lost(pdcp_bus_t *bus, uint8_t place)
 {
+    pdcp_assert(pdcp_request_is_idle(bus, place), "pdcp_job.h: the request is cancelled");
     pdcp_job_t *job = &bus->link.job;
     if (!job->active) {
         return;

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_ends.h"
 #include "pdcp_job.h"
 
@@ -126,6 +127,7 @@ void pdcp_link_on_ready(pdcp_bus_t *bus, uint8_t place)
 /* The links of a lost device become inactive: what its outputs fed is silenced (D-BUS-14). */
 void pdcp_link_on_lost(pdcp_bus_t *bus, uint8_t place)
 {
+    pdcp_assert(pdcp_request_is_idle(bus, place), "pdcp_link.h: the request is cancelled");
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         pdcp_channel_t *channel = &bus->tables.channels[i];
         if (channel->link == PDCP_LINK_ACTIVE &&

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_bytes.h"
 
 bool pdcp_request_is_idle(pdcp_bus_t *bus, uint8_t place)
@@ -95,6 +96,9 @@ void pdcp_request_start(pdcp_bus_t *bus, uint8_t place, pdcp_client_t client, ui
 {
     pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
     pdcp_request_t *request = &device->request;
+    pdcp_assert(request->state == PDCP_REQUEST_IDLE, "pdcp_request.h: the place is idle");
+    pdcp_assert(client != PDCP_CLIENT_RAW || (size != 0 && size <= CAN_FRAME_DATA_MAX && code < PDCP_ANSWER),
+                "pdcp_request.h: a raw request is a frame with the code of a request");
     memset(request, 0, sizeof *request);
     request->bytes = bytes;
     request->size = size;

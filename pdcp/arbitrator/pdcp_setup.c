@@ -2,6 +2,7 @@
 
 #include <stddef.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_bind.h"
 #include "pdcp_bytes.h"
 #include "pdcp_ends.h"
@@ -127,6 +128,7 @@ void pdcp_setup_ask(pdcp_bus_t *bus, uint8_t place)
 void pdcp_setup_start(pdcp_bus_t *bus, uint8_t place)
 {
     pdcp_device_entry_t *device = pdcp_bus_device(bus, place);
+    pdcp_assert(pdcp_request_is_idle(bus, place), "pdcp_setup.h: no request is under way");
     device->state = PDCP_PLACE_SETUP;
     device->setup_pass = PASS_DEVICE;
     device->setup_step = 0;

@@ -2,6 +2,7 @@
 
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_bytes.h"
 #include "pdcp_codec.h"
 
@@ -48,6 +49,8 @@ uint8_t pdcp_tables_free_place(const pdcp_tables_t *tables)
 void pdcp_tables_add(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id)
 {
     pdcp_device_entry_t *device = &tables->devices[place];
+    pdcp_assert(device->state == PDCP_PLACE_FREE, "pdcp_tables.h: the place is free");
+    pdcp_assert(tables->owner[node_id] == 0, "pdcp_tables.h: the node id is free");
     device->state = PDCP_PLACE_SETUP;
     device->identity = *identity;
     device->node_id = node_id;
@@ -56,6 +59,7 @@ void pdcp_tables_add(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t
 
 void pdcp_tables_hold(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t *identity)
 {
+    pdcp_assert(tables->devices[place].state == PDCP_PLACE_FREE, "pdcp_tables.h: the place is free");
     tables->devices[place].state = PDCP_PLACE_ASKED;
     tables->devices[place].identity = *identity;
 }
@@ -98,6 +102,8 @@ static void drop_needs(pdcp_tables_t *tables, pdcp_device_entry_t *gone)
 
 void pdcp_tables_set_output_id(pdcp_tables_t *tables, pdcp_channel_t *output, uint8_t node_id)
 {
+    pdcp_assert(node_id == 0 || node_id == output->node_id || tables->owner[node_id] == 0,
+                "pdcp_tables.h: the node id is free");
     if (output->node_id != 0) {
         tables->owner[output->node_id] = 0;
     }
@@ -312,6 +318,7 @@ bool pdcp_tables_needs(const pdcp_tables_t *tables, uint8_t channel, bool desire
 {
     const pdcp_channel_t *needing = &tables->channels[channel];
     const pdcp_device_entry_t *owner = &tables->devices[needing->place];
+    pdcp_assert(owner->needs_stride != 0, "pdcp_tables.h: the device has room for needs");
     const uint8_t *set = &tables->needs[set_at(owner, needing, desired)];
     uint16_t bit = 0;
     for (uint8_t c = owner->first_channel; c != PDCP_NONE; c = tables->channels[c].next) {
@@ -341,6 +348,8 @@ static uint8_t link_to(const pdcp_tables_t *tables, const pdcp_channel_t *input,
 uint8_t pdcp_tables_rival(const pdcp_tables_t *tables, uint8_t output, uint8_t input)
 {
     const pdcp_channel_t *asked = &tables->channels[input];
+    pdcp_assert(asked->place != tables->channels[output].place,
+                "pdcp_tables.h: the input is another device's");
     const uint8_t own = link_to(tables, asked, output);
     for (uint8_t i = 0; i < PDCP_CHANNELS_MAX; i++) {
         const pdcp_channel_t *other = &tables->channels[i];

@@ -3,6 +3,7 @@
 #include <stddef.h>
 #include <string.h>
 
+#include "pdcp_assert.h"
 #include "pdcp_bytes.h"
 
 /* Fields of a message, in the order in which they stand behind the function code. */
@@ -153,6 +154,8 @@ static uint8_t *put_fields(uint8_t fields, const pdcp_msg_t *msg, uint8_t *at)
 
 void pdcp_codec_encode(uint16_t can_id, const pdcp_msg_t *msg, can_frame_t *frame)
 {
+    pdcp_assert(layout_of(msg->code) != NULL, "pdcp_codec.h: the code is known");
+    pdcp_assert(msg->len <= sizeof msg->value, "pdcp_codec.h: the value fits its field");
     memset(frame, 0, sizeof *frame);
     frame->id = can_id;
     frame->data[0] = msg->code;

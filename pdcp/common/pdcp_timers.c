@@ -1,5 +1,6 @@
 #include "pdcp_timers.h"
 
+#include "pdcp_assert.h"
 #include "pdcp_time.h"
 
 static bool earlier(const pdcp_timers_t *timers, uint8_t a, uint8_t b)
@@ -37,6 +38,7 @@ static void settle(pdcp_timers_t *timers, uint16_t at, uint8_t timer)
 
 void pdcp_timers_set(pdcp_timers_t *timers, uint8_t timer, uint32_t deadline_ms)
 {
+    pdcp_assert(timer < PDCP_TIMERS_MAX, "pdcp_timers.h: the timer is one");
     timers->deadline_ms[timer] = deadline_ms;
     if (timers->place[timer] == 0) {
         timers->count++;

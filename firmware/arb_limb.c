@@ -13,7 +13,13 @@
 
 #define SCORE_BOTH 256u /* of a link that is there with both ends; with one end: 1 */
 
-/* What is under way. */
+/* What is under way. A job of arb_config that ends leads from one stage to the next:
+ *
+ *   start-up   IDLE --> SCORE --> START --> IDLE
+ *   load       IDLE --> CHECK --> LOAD --> PLAN --> IDLE
+ *   others     IDLE --> SAVE, ERASE or PLAN --> IDLE
+ *
+ * A stage that fails leads to IDLE. */
 typedef enum {
     STAGE_IDLE,
     STAGE_SCORE, /* start-up: all stored configurations are read, the best one wins */
@@ -101,12 +107,17 @@ void arb_limb_on_written(arb_limb_t *limb, pdcp_arb_t *arb)
     }
 }
 
-/* What was under way has ended. */
-static void end(arb_limb_t *limb, uint8_t error)
+static void enter(arb_limb_t *limb, stage_t stage)
 {
-    limb->stage = STAGE_IDLE;
+    limb->stage = (uint8_t)stage;
+}
+
+/* The host's action has ended. */
+static stage_t end_action(arb_limb_t *limb, uint8_t error)
+{
     limb->ended = true;
     limb->error = error;
+    return STAGE_IDLE;
 }
 
 /* What the host is told (D-API-4). */
@@ -127,11 +138,11 @@ uint8_t arb_limb_error(arb_config_status_t status)
     }
 }
 
-/* A job of arb_config was to be started for this stage. */
-static uint8_t started(arb_limb_t *limb, stage_t stage, arb_config_status_t status)
+/* Begins a stage of an action, whose job of arb_config was started with this status. */
+static uint8_t begin(arb_limb_t *limb, stage_t stage, arb_config_status_t status)
 {
     if (status == ARB_CONFIG_OK) {
-        limb->stage = (uint8_t)stage;
+        enter(limb, stage);
     }
     return arb_limb_error(status);
 }
@@ -185,54 +196,51 @@ static void on_link(void *ctx, uint8_t number, const profile_link_t *link)
     }
 }
 
-static uint8_t read_all(arb_limb_t *limb, stage_t stage)
-{
-    return started(limb, stage, arb_config_read(&limb->config));
-}
-
 /* --- Start-up: which stored configuration (D-PRO-4) --- */
 
-static void start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
+static stage_t start(arb_limb_t *limb, pdcp_arb_t *arb, uint8_t number)
 {
-    limb->stage = STAGE_IDLE;
     set_active(limb, number);
     profile_start_begin(&limb->run, arb, number != 0);
     limb->run.changed = false; /* what was loaded or read back is not a change to be saved */
+    return STAGE_IDLE;
 }
 
 /* The bus is quiet: the start-up begins. */
-static void begin_start(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t begin_start(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     limb->best = 0;
     limb->best_score = 0;
     limb->number = 0;
     limb->score = 0;
     if (limb->config.stored == 0) {
-        start(limb, arb, 0);
-    } else {
-        (void)read_all(limb, STAGE_SCORE); /* refused while busy: again with the next step */
+        return start(limb, arb, 0);
     }
+    return arb_config_read(&limb->config) == ARB_CONFIG_OK
+               ? STAGE_SCORE
+               : STAGE_IDLE; /* refused while busy: again with the next step */
 }
 
 /* All are scored. */
-static void end_score(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t end_score(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     compare(limb);
     profile_active_load_begin(&limb->run, true);
     limb->number = limb->best;
-    if (limb->status != ARB_CONFIG_OK || limb->best == 0 || read_all(limb, STAGE_START) != ARB_OK) {
-        start(limb, arb, 0);
+    if (limb->status != ARB_CONFIG_OK || limb->best == 0 || arb_config_read(&limb->config) != ARB_CONFIG_OK) {
+        return start(limb, arb, 0);
     }
+    return STAGE_START;
 }
 
 /* The best one is loaded. */
-static void end_start(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t end_start(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status != ARB_CONFIG_OK) {
         profile_active_load_begin(&limb->run, true);
         limb->number = 0;
     }
-    start(limb, arb, limb->number);
+    return start(limb, arb, limb->number);
 }
 
 /* --- Actions --- */
@@ -252,10 +260,10 @@ static uint8_t begin_save(arb_limb_t *limb)
     if (status == ARB_CONFIG_OK) {
         limb->run.frozen = true;
     }
-    return started(limb, STAGE_SAVE, status);
+    return begin(limb, STAGE_SAVE, status);
 }
 
-static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t end_save(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     limb->run.frozen = false;
     (void)profile_active_take_up(&limb->run);
@@ -264,52 +272,55 @@ static void end_save(arb_limb_t *limb, pdcp_arb_t *arb)
         pdcp_arb_plan_links(arb, true);
         set_active(limb, limb->number);
     }
-    end(limb, arb_limb_error((arb_config_status_t)limb->status));
+    return end_action(limb, arb_limb_error((arb_config_status_t)limb->status));
 }
 
 static uint8_t begin_load(arb_limb_t *limb)
 {
     limb->score = 0;
-    return arb_config_has(&limb->config, limb->number) ? read_all(limb, STAGE_CHECK) : ARB_ERR_NUMBER;
+    if (!arb_config_has(&limb->config, limb->number)) {
+        return ARB_ERR_NUMBER;
+    }
+    return begin(limb, STAGE_CHECK, arb_config_read(&limb->config));
 }
 
 /* If the memory can be read, and there is room (D-PRO-11), the links go into the table now. */
-static void end_check(arb_limb_t *limb)
+static stage_t end_check(arb_limb_t *limb)
 {
     if (limb->status != ARB_CONFIG_OK || limb->score > PROFILE_LINKS_MAX ||
-        read_all(limb, STAGE_LOAD) != ARB_OK) {
-        end(limb, ARB_ERR_STORAGE);
-        return;
+        arb_config_read(&limb->config) != ARB_CONFIG_OK) {
+        return end_action(limb, ARB_ERR_STORAGE);
     }
     profile_active_load_begin(&limb->run, false);
+    return STAGE_LOAD;
 }
 
-static void plan(arb_limb_t *limb, uint8_t what, bool anew)
+static stage_t plan(arb_limb_t *limb, uint8_t what, bool anew)
 {
-    limb->stage = STAGE_PLAN;
     profile_run_begin(&limb->run, what, anew);
+    return STAGE_PLAN;
 }
 
 /* Originals and replacements are made, and nothing is autoconfigured (D-PRO-16). */
-static void end_load(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t end_load(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status != ARB_CONFIG_OK) { /* it could be read a moment ago */
-        end(limb, ARB_ERR_STORAGE);
-        return;
+        return end_action(limb, ARB_ERR_STORAGE);
     }
     set_active(limb, limb->number);
     pdcp_arb_plan_links(arb, true);
-    plan(limb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, true);
+    const stage_t next = plan(limb, PROFILE_PLAN_ORIGINALS | PROFILE_PLAN_REPLACE, true);
     limb->run.changed = false;
     limb->unsaved = false;
+    return next;
 }
 
 static uint8_t begin_erase(arb_limb_t *limb)
 {
-    return started(limb, STAGE_ERASE, arb_config_erase(&limb->config, limb->number));
+    return begin(limb, STAGE_ERASE, arb_config_erase(&limb->config, limb->number));
 }
 
-static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     if (limb->status >= 0) {
         limb->told = false;
@@ -317,21 +328,20 @@ static void end_erase(arb_limb_t *limb, pdcp_arb_t *arb)
             forget_active(limb, arb);
         }
     }
-    end(limb, arb_limb_error((arb_config_status_t)limb->status));
+    return end_action(limb, arb_limb_error((arb_config_status_t)limb->status));
 }
 
 /* Before the start-up, with no device there, nothing is to be planned, and the start-up is still to come.
  * After a clear, no link of the configuration is left, and none counts as working. */
-static void plan_for_host(arb_limb_t *limb, uint8_t what, bool clear)
+static stage_t plan_for_host(arb_limb_t *limb, uint8_t what, bool clear)
 {
     if (clear) {
         profile_active_load_begin(&limb->run, false);
     }
     if (limb->run.state == PROFILE_RUN_WAITING) {
-        end(limb, ARB_OK);
-        return;
+        return end_action(limb, ARB_OK);
     }
-    plan(limb, what, clear);
+    return plan(limb, what, clear);
 }
 
 bool arb_limb_is_starting(const arb_limb_t *limb)
@@ -356,7 +366,7 @@ uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
         return begin_erase(limb);
     case ARB_ACTION_ADOPT:
         limb->result = profile_active_adopt_stand_ins(&limb->run);
-        end(limb, ARB_OK);
+        enter(limb, end_action(limb, ARB_OK));
         return ARB_OK;
     case ARB_ACTION_AUTOCONFIGURE:
         what = PROFILE_PLAN_AUTO;
@@ -370,7 +380,7 @@ uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument)
     default:
         return ARB_ERR_VALUE;
     }
-    plan_for_host(limb, what, action == ARB_ACTION_CLEAR);
+    enter(limb, plan_for_host(limb, what, action == ARB_ACTION_CLEAR));
     return ARB_OK;
 }
 
@@ -381,36 +391,30 @@ void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms,
     if (event->kind == PDCP_EVENT_SILENT) { /* on standby there is no limb */
         set_active(limb, 0);
         if (limb->stage == STAGE_PLAN) { /* what the memory is doing goes on */
-            end(limb, ARB_ERR_NOT_READY);
+            enter(limb, end_action(limb, ARB_ERR_NOT_READY));
         }
     }
     profile_events_take(&limb->run, arb, now_ms, event);
 }
 
 /* A job of arb_config has ended; at another stage it was the host's. */
-static void next_stage(arb_limb_t *limb, pdcp_arb_t *arb)
+static stage_t next_stage(arb_limb_t *limb, pdcp_arb_t *arb)
 {
     switch ((stage_t)limb->stage) {
     case STAGE_SCORE:
-        end_score(limb, arb);
-        break;
+        return end_score(limb, arb);
     case STAGE_START:
-        end_start(limb, arb);
-        break;
+        return end_start(limb, arb);
     case STAGE_CHECK:
-        end_check(limb);
-        break;
+        return end_check(limb);
     case STAGE_LOAD:
-        end_load(limb, arb);
-        break;
+        return end_load(limb, arb);
     case STAGE_SAVE:
-        end_save(limb, arb);
-        break;
+        return end_save(limb, arb);
     case STAGE_ERASE:
-        end_erase(limb, arb);
-        break;
+        return end_erase(limb, arb);
     default:
-        break;
+        return (stage_t)limb->stage;
     }
 }
 
@@ -441,15 +445,15 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
     limb->status = (int8_t)arb_config_step(&limb->config, nvm, now_ms);
     arb_flags_step(&limb->flags, nvm, now_ms);
     if (limb->status != ARB_CONFIG_ERR_BUSY) {
-        next_stage(limb, arb);
+        enter(limb, next_stage(limb, arb));
     }
     if (limb->stage == STAGE_IDLE && profile_start_may_begin(&limb->run, arb, now_ms)) {
-        begin_start(limb, arb);
+        enter(limb, begin_start(limb, arb));
     }
     const bool handed = profile_step(&limb->run, arb, now_ms);
     if (limb->stage == STAGE_PLAN && profile_run_status(&limb->run) != PROFILE_CONFIGURING) {
         limb->result = limb->run.moves;
-        end(limb, limb->error);
+        enter(limb, end_action(limb, limb->error));
     }
     auto_save(limb, now_ms);
     return handed;

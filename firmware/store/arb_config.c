@@ -15,6 +15,11 @@ enum { CONFIG_MEMBERS = 8 }; /* bytes of a header before its CRC */
 /* Bytes read at a time: whole entries. */
 enum { CONFIG_CHUNK = (int)ARB_CONFIG_READ_MAX / PROFILE_TLV_ENTRY_BYTES * PROFILE_TLV_ENTRY_BYTES };
 
+/* Phases of a job. A phase that fails leads to IDLE, and so does a new string that is the stored one.
+ *
+ *   read                IDLE --> READ --> IDLE
+ *   save, erase         IDLE --> SCAN --> NEW --> CHECK --> HEADER --> ADOPT --> IDLE
+ *   the host's pieces   IDLE --> NEW --> IDLE, the last one IDLE --> NEW --> CHECK and on as above */
 typedef enum {
     PHASE_IDLE = 0, /* see arb_config_busy */
     PHASE_READ,     /* the stored string goes to the user */
@@ -140,16 +145,29 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user
 
 /* Jobs -------------------------------------------------------------------------------------------------- */
 
+static void enter(arb_config_t *config, phase_t phase)
+{
+    config->phase = (uint8_t)phase;
+}
+
 /* With no job under way due_ms is the time of the last step. */
 static void start(arb_config_t *config, phase_t phase)
 {
-    config->phase = (uint8_t)phase;
+    enter(config, phase);
     config->polls = 0;
 }
 
-static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t status)
+/* The job ends with this status. */
+static phase_t end(arb_config_t *config, arb_config_status_t status)
 {
-    config->phase = PHASE_IDLE;
+    config->status = (int8_t)status;
+    return PHASE_IDLE;
+}
+
+/* The job has ended. */
+static arb_config_status_t finish(arb_config_t *config, arb_nvm_t *nvm)
+{
+    const arb_config_status_t status = (arb_config_status_t)config->status;
     arb_nvm_give(nvm, ARB_NVM_CONFIG);
     if (status == ARB_CONFIG_UNCHANGED) {
         count(config, ARB_CONFIG_COUNT_UNCHANGED);
@@ -159,6 +177,7 @@ static void finish(arb_config_t *config, arb_nvm_t *nvm, arb_config_status_t sta
     if (config->splice.piece != NULL) {
         config->raw_status = (int8_t)status;
     }
+    return status;
 }
 
 arb_config_status_t arb_config_read(arb_config_t *config)
@@ -285,23 +304,21 @@ static bool put_new(const arb_config_t *config, const arb_nvm_t *nvm, uint8_t *b
 
 /* Phases ------------------------------------------------------------------------------------------------ */
 
-/* Each does one step. The job ends with anything but ARB_CONFIG_OK, and when the phase is idle afterwards. */
-typedef arb_config_status_t (*phase_step_t)(arb_config_t *config, const arb_nvm_t *nvm);
+/* Each does one step and returns the phase that follows. */
+typedef phase_t (*phase_step_t)(arb_config_t *config, const arb_nvm_t *nvm);
 
 /* The new string, or a piece of the host's, has been compared or written to its end. */
-static arb_config_status_t end_part(arb_config_t *config)
+static phase_t end_part(arb_config_t *config)
 {
     if (config->splice.piece != NULL && config->until < config->length_new) {
         config->raw_at = config->until;
-        config->phase = PHASE_IDLE;
-        return ARB_CONFIG_OK;
+        return end(config, ARB_CONFIG_OK);
     }
     if (config->same) {
-        return ARB_CONFIG_UNCHANGED;
+        return end(config, ARB_CONFIG_UNCHANGED);
     }
-    config->phase = PHASE_CHECK;
     open_string(config, arb_area_next(&config->newest), config->length_new, NULL);
-    return ARB_CONFIG_OK;
+    return PHASE_CHECK;
 }
 
 static void begin_write(arb_config_t *config)
@@ -313,15 +330,16 @@ static void begin_write(arb_config_t *config)
     }
 }
 
-static arb_config_status_t write_page(arb_config_t *config, const arb_nvm_t *nvm, uint16_t address,
-                                      const uint8_t *bytes, uint16_t len)
+/* next: the phase that follows once the page is being written. */
+static phase_t write_page(arb_config_t *config, const arb_nvm_t *nvm, uint16_t address, const uint8_t *bytes,
+                          uint16_t len, phase_t next)
 {
     if (!arb_nvm_write(nvm, address, bytes, len)) {
-        return ARB_CONFIG_ERR_STORAGE;
+        return end(config, ARB_CONFIG_ERR_STORAGE);
     }
     config->writing = true;
     count(config, ARB_CONFIG_PAGES);
-    return ARB_CONFIG_OK;
+    return next;
 }
 
 /* Corrects the number of configurations if it stands in these bytes of the new string. It stands in front of
@@ -335,7 +353,7 @@ static void put_count(const arb_config_t *config, uint16_t at, uint8_t *bytes, u
 }
 
 /* Compares or writes the next bytes of the new string. */
-static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
+static phase_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t fresh[ARB_PORT_NVM_PAGE];
     const uint16_t at = config->at;
@@ -345,28 +363,28 @@ static arb_config_status_t step_new(arb_config_t *config, const arb_nvm_t *nvm)
         return end_part(config);
     }
     if (!put_new(config, nvm, fresh, len)) {
-        return ARB_CONFIG_ERR_STORAGE;
+        return end(config, ARB_CONFIG_ERR_STORAGE);
     }
     config->at = (uint16_t)(at + len);
     if (config->same) {
         uint8_t stored[CONFIG_CHUNK];
         if (!read_string(nvm, config->newest.area, at, stored, len)) {
-            return ARB_CONFIG_ERR_STORAGE;
+            return end(config, ARB_CONFIG_ERR_STORAGE);
         }
         if (memcmp(stored, fresh, len) != 0) {
             begin_write(config);
-            return ARB_CONFIG_OK;
+            return PHASE_NEW;
         }
-        return config->at < config->until ? ARB_CONFIG_OK : end_part(config);
+        return config->at < config->until ? PHASE_NEW : end_part(config);
     }
     put_count(config, at, fresh, len);
     config->crc_new = arb_crc32(at == 0 ? ARB_CRC32_INIT : config->crc_new, fresh, len);
     return write_page(config, nvm, (uint16_t)(string_address(arb_area_next(&config->newest)) + at), fresh,
-                      len);
+                      len, PHASE_NEW);
 }
 
 /* The stored string has been read. */
-static arb_config_status_t end_scan(arb_config_t *config)
+static phase_t end_scan(arb_config_t *config)
 {
     const arb_splice_t *splice = &config->splice;
     if (splice->found == ARB_SPLICE_FOUND) {
@@ -374,26 +392,25 @@ static arb_config_status_t end_scan(arb_config_t *config)
     }
     config->length_new = arb_splice_length(splice);
     if (config->length_new > ARB_CONFIG_STRING_MAX) {
-        return ARB_CONFIG_ERR_STORAGE;
+        return end(config, ARB_CONFIG_ERR_STORAGE);
     }
     begin_write(config);
-    config->phase = PHASE_NEW;
     if (config->length_new == config->length) { /* then a block of another length has another last entry */
         config->same = true;
         config->at = splice->from;
         config->until = (uint16_t)(splice->from + splice->block);
     }
-    return ARB_CONFIG_OK;
+    return PHASE_NEW;
 }
 
 /* Reads a string; what comes of it at its end. A new one gets its header only if it reads back as it was
  * written, and nothing is built upon a stored one that is damaged (D-PRO-21). */
-static arb_config_status_t step_read(arb_config_t *config, const arb_nvm_t *nvm)
+static phase_t step_read(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t bytes[CONFIG_CHUNK];
     const uint16_t at = config->at;
     if (!read_on(config, nvm, bytes)) {
-        return ARB_CONFIG_ERR_STORAGE;
+        return end(config, ARB_CONFIG_ERR_STORAGE);
     }
     for (uint16_t i = 0; config->phase == PHASE_SCAN && config->splice.end == 0 &&
                          at + i + PROFILE_TLV_ENTRY_BYTES <= config->at;
@@ -401,38 +418,38 @@ static arb_config_status_t step_read(arb_config_t *config, const arb_nvm_t *nvm)
         arb_splice_scan(&config->splice, (uint16_t)(at + i), &bytes[i]);
     }
     if (config->at < config->until) {
-        return ARB_CONFIG_OK;
+        return (phase_t)config->phase;
     }
     if (config->crc_read != (config->phase == PHASE_CHECK ? config->crc_new : config->crc)) {
-        return ARB_CONFIG_ERR_STORAGE;
+        return end(config, ARB_CONFIG_ERR_STORAGE);
     }
     if (config->phase == PHASE_SCAN) {
         return end_scan(config);
     }
-    config->phase = config->phase == PHASE_CHECK ? PHASE_HEADER : PHASE_IDLE;
-    return config->reader.status == PROFILE_TLV_DONE ? ARB_CONFIG_OK : ARB_CONFIG_ERR_VALUE;
+    if (config->reader.status != PROFILE_TLV_DONE) {
+        return end(config, ARB_CONFIG_ERR_VALUE);
+    }
+    return config->phase == PHASE_CHECK ? PHASE_HEADER : end(config, ARB_CONFIG_OK);
 }
 
-static arb_config_status_t step_header(arb_config_t *config, const arb_nvm_t *nvm)
+static phase_t step_header(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t header[ARB_CONFIG_HEADER];
     arb_area_put_header(&config->newest, 'C', 0, header);
     pdcp_bytes_put_u16(&header[6], config->until);
     pdcp_bytes_put_u32(&header[CONFIG_MEMBERS], ~arb_crc32(config->crc_read, header, CONFIG_MEMBERS));
-    config->phase = PHASE_ADOPT;
-    return write_page(config, nvm, header_address(config->from), header, sizeof header);
+    return write_page(config, nvm, header_address(config->from), header, sizeof header, PHASE_ADOPT);
 }
 
-static arb_config_status_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm)
+static phase_t step_adopt(arb_config_t *config, const arb_nvm_t *nvm)
 {
     uint8_t header[ARB_CONFIG_HEADER];
-    config->phase = PHASE_IDLE;
     if (!arb_nvm_read(nvm, header_address(config->from), header, sizeof header) || !adopt(config, header) ||
         config->newest.area != config->from) {
-        return ARB_CONFIG_ERR_STORAGE;
+        return end(config, ARB_CONFIG_ERR_STORAGE);
     }
     count(config, ARB_CONFIG_WRITES);
-    return ARB_CONFIG_OK;
+    return end(config, ARB_CONFIG_OK);
 }
 
 arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms)
@@ -456,11 +473,11 @@ arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32
     const bool failed = state > 0 || (state < 0 && config->writing);
     config->polls = 0;
     config->writing = false;
-    const arb_config_status_t status = failed ? ARB_CONFIG_ERR_STORAGE : steps[config->phase](config, nvm);
-    if (status != ARB_CONFIG_OK || config->phase == PHASE_IDLE) {
+    const phase_t next = failed ? end(config, ARB_CONFIG_ERR_STORAGE) : steps[config->phase](config, nvm);
+    enter(config, next);
+    if (next == PHASE_IDLE) {
         config->due_ms = now_ms;
-        finish(config, nvm, status);
-        return status;
+        return finish(config, nvm);
     }
     if (!config->writing) {
         config->due_ms = now_ms + ARB_CONFIG_PACE_MS;

@@ -84,6 +84,7 @@ typedef struct {
     uint32_t crc; /* register behind the string */
     /* The job. */
     uint8_t phase;      /* what it is at, 0: there is none; private to arb_config.c */
+    int8_t status;      /* how it ends, arb_config_status_t */
     bool writing;       /* a page is under way */
     uint8_t polls;      /* of a memory that is not ready */
     uint8_t stored_new; /* save, erase: how many configurations there will be */

@@ -444,7 +444,7 @@ bool arb_limb_step(arb_limb_t *limb, pdcp_arb_t *arb, arb_nvm_t *nvm, uint32_t n
 {
     limb->status = (int8_t)arb_config_step(&limb->config, nvm, now_ms);
     arb_flags_step(&limb->flags, nvm, now_ms);
-    if (limb->status != ARB_CONFIG_ERR_BUSY) {
+    if (limb->status != ARB_CONFIG_RUNNING) {
         enter(limb, next_stage(limb, arb));
     }
     if (limb->stage == STAGE_IDLE && profile_start_may_begin(&limb->run, arb, now_ms)) {

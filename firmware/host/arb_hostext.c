@@ -120,7 +120,7 @@ uint8_t arb_hostext_write_configs(arb_call_t *call)
             arb_config_write_raw(config, offset, total, &call->payload[ARB_AT_PIECE], len);
         return status == ARB_CONFIG_OK ? arb_call_started(call) : error_of_config(call, (int8_t)status);
     }
-    if (config->raw_status == ARB_CONFIG_ERR_BUSY) {
+    if (config->raw_status == ARB_CONFIG_RUNNING) {
         return ARB_PENDING;
     }
     if (config->raw_status >= 0 && (uint16_t)(total - offset) == len) {

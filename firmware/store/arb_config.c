@@ -255,7 +255,7 @@ arb_config_status_t arb_config_write_raw(arb_config_t *config, uint16_t offset, 
     }
     arb_splice_insert(&config->splice, offset, bytes, len);
     start(config, PHASE_NEW);
-    config->raw_status = ARB_CONFIG_ERR_BUSY;
+    config->raw_status = ARB_CONFIG_RUNNING;
     config->raw_at = 0; /* until the piece is in */
     config->at = offset;
     config->until = (uint16_t)(offset + len);
@@ -460,15 +460,15 @@ arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32
     };
     if (!arb_config_busy(config)) {
         config->due_ms = now_ms;
-        return ARB_CONFIG_ERR_BUSY;
+        return ARB_CONFIG_RUNNING;
     }
     if (pdcp_time_before(now_ms, config->due_ms)) {
-        return ARB_CONFIG_ERR_BUSY;
+        return ARB_CONFIG_RUNNING;
     }
     const int8_t state = arb_nvm_poll(nvm, ARB_NVM_CONFIG, &config->due_ms, now_ms);
     if (state > 0 && config->polls < ARB_CONFIG_POLLS_MAX) {
         config->polls++;
-        return ARB_CONFIG_ERR_BUSY;
+        return ARB_CONFIG_RUNNING;
     }
     const bool failed = state > 0 || (state < 0 && config->writing);
     config->polls = 0;
@@ -482,5 +482,5 @@ arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32
     if (!config->writing) {
         config->due_ms = now_ms + ARB_CONFIG_PACE_MS;
     }
-    return ARB_CONFIG_ERR_BUSY;
+    return ARB_CONFIG_RUNNING;
 }

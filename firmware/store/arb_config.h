@@ -49,7 +49,8 @@ enum {
 typedef enum {
     ARB_CONFIG_OK = 0,           /* a start: it is under way; a job: done */
     ARB_CONFIG_UNCHANGED = 1,    /* a job: done, nothing had to be written */
-    ARB_CONFIG_ERR_BUSY = -1,    /* a start: a job is under way; try again later. A step: none has ended */
+    ARB_CONFIG_RUNNING = 2,      /* a step: no job has ended */
+    ARB_CONFIG_ERR_BUSY = -1,    /* a start: a job is under way; try again later */
     ARB_CONFIG_ERR_STORAGE = -2, /* too long for an area, or the memory has failed: nothing has changed */
     ARB_CONFIG_ERR_VALUE = -3,   /* a piece out of order, or a string that profile_tlv.h rejects */
     ARB_CONFIG_ERR_NUMBER = -4   /* no such configuration */
@@ -99,7 +100,7 @@ typedef struct {
     uint32_t due_ms;
     const arb_config_user_t *user;
     void *ctx;
-    int8_t raw_status; /* how the host's last piece ended; ARB_CONFIG_ERR_BUSY: it is under way */
+    int8_t raw_status; /* how the host's last piece ended; ARB_CONFIG_RUNNING: it is under way */
     uint16_t raw_at;   /* bytes that are in of the host's write, which outlasts the job of a piece */
     profile_tlv_t reader;
 } arb_config_t;
@@ -111,7 +112,7 @@ void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user
 
 /* Does what is due: at most one page written, or ARB_CONFIG_READ_MAX bytes read. Returns, once for every
  * start that returned ARB_CONFIG_OK, how the job ended, after which the next one may be started; else
- * ARB_CONFIG_ERR_BUSY. */
+ * ARB_CONFIG_RUNNING. */
 arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
 
 /* A job is under way. */

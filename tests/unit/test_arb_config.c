@@ -99,7 +99,7 @@ static arb_config_status_t outcome;
 static void step(void)
 {
     const arb_config_status_t result = arb_config_step(&config, &nvm, now_ms);
-    if (result != ARB_CONFIG_ERR_BUSY) {
+    if (result != ARB_CONFIG_RUNNING) {
         done_count++;
         outcome = result;
     }

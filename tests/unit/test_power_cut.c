@@ -606,11 +606,11 @@ static void test_three_users_of_one_memory(void)
         arb_store_touch(&store, now_ms - ARB_STORE_DELAY_MS);
         arb_flags_set(&flags, 0x08, now_ms);
         TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_save(&config, &number, 9));
-        outcome = ARB_CONFIG_ERR_BUSY;
+        outcome = ARB_CONFIG_RUNNING;
         for (int i = 0; i < 3000; i++) {
             memory.fail_after = memory.failed ? SIM_NVM_NEVER : memory.fail_after;
             const arb_config_status_t status = arb_config_step(&config, &nvm, now_ms);
-            if (status != ARB_CONFIG_ERR_BUSY) {
+            if (status != ARB_CONFIG_RUNNING) {
                 outcome = status;
             }
             arb_store_step(&store, &bind, now_ms);

@@ -181,7 +181,7 @@ static uint8_t broadcast(arb_call_t *call, uint8_t dlc, const uint8_t *data)
     if (dlc != (code == PDCP_SUSPEND ? 3 : 1)) {
         return ARB_ERR_VALUE;
     }
-    if (call->arb->silent) {
+    if (pdcp_arb_is_on_standby(call->arb)) {
         return ARB_ERR_NOT_READY;
     }
     if (!pdcp_arb_broadcast(call->arb, code,

@@ -74,7 +74,7 @@ static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t n
 /* A bus that is not there at all counts as off; on standby the arbitrator is silent, however the bus is. */
 static arb_bus_state_t state_of(const pdcp_arb_t *arb)
 {
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         return ARB_BUS_SILENT;
     }
     return arb->recovery.state < PDCP_BUS_OFF ? (arb_bus_state_t)arb->recovery.state : ARB_BUS_OFF;

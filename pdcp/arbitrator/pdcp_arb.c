@@ -52,8 +52,8 @@ static bool on_unknown(pdcp_arb_t *arb, const can_frame_t *frame)
         pdcp_unknown_note(&arb->bus.unknown, arb->bus.now_ms, id);
     }
     pdcp_role_on_device_frame(arb, frame);
-    if (!pdcp_codec_is_beacon(frame) || arb->silent || is_young(arb)) {
-        return arb->silent;
+    if (!pdcp_codec_is_beacon(frame) || pdcp_arb_is_on_standby(arb) || is_young(arb)) {
+        return pdcp_arb_is_on_standby(arb);
     }
     pdcp_life_reset_unknown(arb, id);
     return true;
@@ -149,9 +149,9 @@ bool pdcp_arb_on_frame(pdcp_arb_t *arb, uint32_t now_ms, const can_frame_t *fram
     }
     if (pdcp_id_from_arbitrator(frame->id)) {
         pdcp_role_on_arbitrator_frame(arb, frame);
-        return arb->silent;
+        return pdcp_arb_is_on_standby(arb);
     }
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         return pdcp_role_on_standby_frame(arb, frame);
     }
     if (pdcp_id_priority(frame->id) == PDCP_PRIORITY_BINDING) {
@@ -202,7 +202,7 @@ static void on_beacon_deadline(pdcp_arb_t *arb)
     pdcp_unknown_on_time(&arb->bus.unknown, arb->bus.now_ms);
     pdcp_bind_on_time(&arb->bus);
     pdcp_standby_on_time(&arb->standby, arb->bus.now_ms);
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         pdcp_role_take_over(arb);
     }
     pdcp_suspend_on_beacon(&arb->bus);
@@ -252,7 +252,7 @@ static void on_deadline(pdcp_arb_t *arb, uint8_t timer)
 /* Was it not called, or off the bus, for so long that others may have taken it for gone? */
 static bool is_hung(const pdcp_arb_t *arb)
 {
-    return !arb->silent && !arb->listening && arb->recovery.state < (uint8_t)PDCP_BUS_OFF &&
+    return arb->role == PDCP_ROLE_SERVING && arb->recovery.state < (uint8_t)PDCP_BUS_OFF &&
            pdcp_time_before(arb->beacon_ms + PDCP_HUNG_MS, arb->bus.now_ms);
 }
 
@@ -278,7 +278,7 @@ uint32_t pdcp_arb_step(pdcp_arb_t *arb, uint32_t now_ms)
 
 const can_frame_t *pdcp_arb_tx_peek(const pdcp_arb_t *arb)
 {
-    return arb->listening ? NULL : pdcp_txq_peek(&arb->bus.txq);
+    return arb->role == PDCP_ROLE_LISTENING ? NULL : pdcp_txq_peek(&arb->bus.txq);
 }
 
 void pdcp_arb_tx_pop(pdcp_arb_t *arb)
@@ -356,7 +356,7 @@ void pdcp_arb_give_up(pdcp_arb_t *arb, uint32_t now_ms)
 
 bool pdcp_arb_broadcast(pdcp_arb_t *arb, uint8_t code, uint16_t time_ms)
 {
-    if (arb->silent ||
+    if (pdcp_arb_is_on_standby(arb) ||
         !pdcp_bus_send_word(&arb->bus, PDCP_PRIORITY_NORMAL, PDCP_NODE_BROADCAST, code, time_ms)) {
         return false;
     }

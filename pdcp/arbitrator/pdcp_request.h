@@ -4,7 +4,15 @@
  * exactly one reply whose done is true, unless it is cancelled. Values of more than four bytes go by bulk
  * transfer, as does a value that the device itself wants so. A raw request is a frame as the host made it,
  * whose answer is handed on whole. Which part of the arbitrator asked (the client) travels with the request
- * and comes back in the reply: this file decides nothing about it. */
+ * and comes back in the reply: this file decides nothing about it.
+ *
+ *   get, commands   IDLE --> ANSWER --> IDLE
+ *   get by bulk     IDLE --> ANSWER --> GET_SIZE --> GET_DATA --> IDLE
+ *   set by bulk     IDLE --> SET_SIZE --> SET_DATA <--> SET_ECHO, SET_DATA --> IDLE
+ *   raw             IDLE --> RAW --> IDLE
+ *
+ * A set of up to four bytes goes as a get; if the device wants it by bulk, from ANSWER to SET_SIZE. A bulk
+ * transfer that fails begins again from its size. Silence through all tries leads to IDLE. */
 #ifndef PDCP_REQUEST_H
 #define PDCP_REQUEST_H
 

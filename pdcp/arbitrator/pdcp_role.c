@@ -32,7 +32,6 @@ void pdcp_role_begin(pdcp_arb_t *arb)
     arb->bus.started_ms = arb->bus.now_ms;
     arb->beacon_ms = arb->bus.now_ms;
     arb->held_ms = 0;
-    arb->listening = false;
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);
 }
 
@@ -42,6 +41,11 @@ void pdcp_role_discard_queue(pdcp_arb_t *arb)
 {
     arb->bus.stats[PDCP_STAT_TX_DISCARDED] += arb->bus.txq.count;
     pdcp_txq_init(&arb->bus.txq);
+}
+
+static void enter(pdcp_arb_t *arb, pdcp_role_t role)
+{
+    arb->role = (uint8_t)role;
 }
 
 /* --- Standby --- */
@@ -56,7 +60,7 @@ static void stand_by(pdcp_arb_t *arb)
 /* D-BUS-42: this arbitrator goes on standby; the host, if it waits, is told. */
 static void go_silent(pdcp_arb_t *arb)
 {
-    arb->silent = true;
+    enter(arb, PDCP_ROLE_STANDBY);
     pdcp_host_end(&arb->bus, &arb->host, PDCP_ERR_NO_ANSWER);
     if (pdcp_link_request_waits(&arb->bus)) {
         pdcp_bus_tell(&arb->bus, PDCP_EVENT_LINK_REQUEST, PDCP_NONE, PDCP_ERR_NO_ANSWER);
@@ -69,7 +73,7 @@ static void go_silent(pdcp_arb_t *arb)
 /* The standby is over: the other arbitrator is gone, or serves no longer (D-BUS-42). */
 void pdcp_role_take_over(pdcp_arb_t *arb)
 {
-    arb->silent = false;
+    enter(arb, PDCP_ROLE_SERVING);
     pdcp_role_begin(arb);
     pdcp_bus_tell_device(&arb->bus, PDCP_EVENT_STARTED, PDCP_NONE);
 }
@@ -95,7 +99,7 @@ static void on_foreign_beacon(pdcp_arb_t *arb)
 {
     pdcp_bus_count(&arb->bus, PDCP_STAT_FOREIGN_BEACON);
     const bool is_first = pdcp_standby_on_beacon(&arb->standby, arb->bus.now_ms);
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         stand_by(arb);
         return;
     }
@@ -114,7 +118,7 @@ static void on_foreign_grant(pdcp_arb_t *arb, const pdcp_identity_t *identity)
     if (place != PDCP_NONE) {
         pdcp_hold_drop(arb, place);
     }
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         pdcp_standby_on_sign_of_life(&arb->standby);
         pdcp_timers_cancel(&arb->bus.timers, PDCP_TIMER_STANDBY);
     }
@@ -127,7 +131,7 @@ void pdcp_role_on_device_frame(pdcp_arb_t *arb, const can_frame_t *frame)
         !pdcp_standby_on_answer(&arb->standby, arb->bus.now_ms, frame)) {
         return;
     }
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         pdcp_standby_on_sign_of_life(&arb->standby);
     } else if (is_to_yield(arb)) {
         go_silent(arb);
@@ -188,7 +192,7 @@ bool pdcp_role_on_standby_frame(pdcp_arb_t *arb, const can_frame_t *frame)
  * (D-BUS-42, D-BUS-51). */
 void pdcp_role_listen(pdcp_arb_t *arb)
 {
-    arb->listening = true;
+    enter(arb, PDCP_ROLE_LISTENING);
     pdcp_role_discard_queue(arb);
     pdcp_bus_wake(&arb->bus, PDCP_TIMER_STANDBY, PDCP_LISTEN_MS);
 }
@@ -196,14 +200,14 @@ void pdcp_role_listen(pdcp_arb_t *arb)
 void pdcp_role_on_standby_deadline(pdcp_arb_t *arb)
 {
     const uint32_t now_ms = arb->bus.now_ms;
-    if (arb->silent) {
+    if (pdcp_arb_is_on_standby(arb)) {
         if (pdcp_standby_on_unbound(&arb->standby, now_ms, now_ms - PDCP_UNBOUND_WAIT_MS)) {
             pdcp_role_take_over(arb);
         }
     } else if (pdcp_standby_serves(&arb->standby, now_ms)) {
         go_silent(arb);
     } else {
-        arb->listening = false;
+        enter(arb, PDCP_ROLE_SERVING);
         arb->beacon_ms = now_ms;
         pdcp_role_discard_queue(arb);
         pdcp_bus_wake(&arb->bus, PDCP_TIMER_BEACON, 0);

@@ -1,5 +1,14 @@
-/* Role of this arbitrator on a bus that may have another one: it serves, is on standby, or listens (D-BUS-12,
- * D-BUS-35, D-BUS-42, D-BUS-51). What is known of the other one says pdcp_standby. */
+/* Role of this arbitrator on a bus that may have another one (D-BUS-12, D-BUS-35, D-BUS-42, D-BUS-51).
+ *
+ *           another one serves                 own beacons do not leave
+ *   STANDBY <------------------- SERVING ------------------------------> LISTENING
+ *      ^    ------------------->    ^                                     |    |
+ *      |    it is gone, or serves   +-------------------------------------+    |
+ *      |    no longer                 nobody else serves                       |
+ *      +-----------------------------------------------------------------------+
+ *                                     another one serves
+ *
+ * pdcp_standby.h keeps what is known of the other arbitrator. */
 #ifndef PDCP_ROLE_H
 #define PDCP_ROLE_H
 

@@ -4,7 +4,12 @@
  * Four passes: the device's own parameters; transfer enabled 0 to every channel; the direction of every
  * channel; everything else of every channel. Each device is on its own way, so that none holds up another. A
  * step that fails is tried again after a pause; when it has failed PDCP_SETUP_ATTEMPTS times, or there is no
- * room, the device is left bound but unlinked (D-BUS-17). */
+ * room, the device is left bound but unlinked (D-BUS-17).
+ *
+ *   DEVICE --> SILENCE --> DIRECTION --> CHANNELS --> PDCP_PLACE_READY
+ *
+ * A pass is a list of steps, walked once (DEVICE) or once for each channel. A failed step pauses and stays;
+ * PDCP_SETUP_ATTEMPTS failures lead to PDCP_PLACE_FAILED and, 5 s later, to DEVICE. */
 #ifndef PDCP_SETUP_H
 #define PDCP_SETUP_H
 

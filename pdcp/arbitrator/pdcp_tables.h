@@ -15,6 +15,21 @@
 
 #define PDCP_NONE 0xFFu
 
+/* States of a place, and what leads from one to the next:
+ *
+ *   FREE     a bind request is granted ................... SETUP
+ *            a bind request is held (D-BUS-42) ........... ASKED
+ *   ASKED    it is granted ............................... SETUP
+ *            another arbitrator answers it ............... FREE
+ *   SETUP    all is read and written ..................... READY
+ *            a step fails for the fifth time ............. FAILED
+ *            an unknown identity is not heard (D-BUS-43) . FREE
+ *   FAILED   5 s are over ................................ SETUP
+ *   LOST     it binds again, or beacons on its id ........ SETUP
+ *            10 s are over ............................... FREE
+ *   SETUP, READY, FAILED
+ *            silent for three beacons, or reset .......... LOST
+ *            its identity binds again .................... SETUP */
 typedef enum {
     PDCP_PLACE_FREE = 0,
     PDCP_PLACE_SETUP,  /* bound, being read and written */

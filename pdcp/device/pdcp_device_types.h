@@ -111,6 +111,15 @@ typedef struct {
     void (*written)(void *ctx, uint8_t channel, uint8_t param);
 } pdcp_device_port_t;
 
+/* States of a device (D-BUS-16).
+ *
+ *             granted                silent arbitrator, 3 s
+ *   ASKING -----------------> BOUND ------------------------> ALONE
+ *      ^                       |  ^                             |  |
+ *      +-----------------------+  +-----------------------------+  |
+ *      |        reset                   an arbitrator is heard     |
+ *      +-----------------------------------------------------------+
+ *                                reset                              */
 typedef enum {
     PDCP_DEVICE_ASKING = 0, /* unbound: asks for a node id */
     PDCP_DEVICE_BOUND = 1,  /* beacons, answers, streams */

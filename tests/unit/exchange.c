@@ -309,5 +309,5 @@ void exchange_meet_rival(exchange_t *x)
         exchange_beacons(x);
         exchange_pass(x, 500);
     }
-    TEST_ASSERT_FALSE(x->arb->silent);
+    TEST_ASSERT_FALSE(pdcp_arb_is_on_standby(x->arb));
 }

@@ -274,7 +274,7 @@ static void test_passthrough_to_all(void)
 static void test_passthrough_to_all_on_standby(void)
 {
     exchange_meet_server(&x);
-    TEST_ASSERT_TRUE(x.arb->silent);
+    TEST_ASSERT_TRUE(pdcp_arb_is_on_standby(x.arb));
     ask(0x230A, BYTES(0, 0, 0, 0, 0, 0, 1, 9, 0, 0, 0, 0, 0, 0, 0));
     expect_error(0x230C, 0x0B);
     exchange_silence(&x);

@@ -140,7 +140,7 @@ static void test_on_standby_every_frame_is_classified(void)
         }
     }
     TEST_ASSERT_EQUAL_HEX32(before, tables());
-    TEST_ASSERT_TRUE(x.arb->silent);
+    TEST_ASSERT_TRUE(pdcp_arb_is_on_standby(x.arb));
 }
 
 /* Brings device 11h's place into a state of its request, asked by the host. */

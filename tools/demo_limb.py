@@ -19,7 +19,6 @@ from contextlib import ExitStack
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
-from pdcp.cli.common import new_table
 from programs import EndedError, Pdcpd, Program, Value, until
 from rich.console import Console, Group
 from rich.live import Live
@@ -27,6 +26,7 @@ from rich.table import Table
 from rich.text import Text
 
 from pdcp import ChannelId, Client, ConnectionFailedError, Identity, LinkStatus, PdcpError
+from pdcp.cli.common import new_table
 
 FOLDER = Path(__file__).resolve().parent / "demo.d"
 SENSOR, CONTROLLER, HAND, SPARE = (FOLDER / f"d{number}.ini" for number in (1, 2, 3, 4))

@@ -23,17 +23,17 @@ from unittest import mock
 import can
 import jsonschema
 import pytest
+from programs import LINE_TIMEOUT_S, Pdcpd, Program, Value, until
+from scripted import ScriptedArbitrator
+from simbus import open_sim_bus
+
+from pdcp import ChannelId, Client, EventKind, Identity
 from pdcp.cli import app
 from pdcp.cli.common import run
 from pdcp.counters import GROUPS
 from pdcp.events import AuditDifference, CanFrame
 from pdcp.model import ProfileState
 from pdcp.wire import Frame
-from programs import LINE_TIMEOUT_S, Pdcpd, Program, Value, until
-from scripted import ScriptedArbitrator
-from simbus import open_sim_bus
-
-from pdcp import ChannelId, Client, EventKind, Identity
 
 COMMAND = Path(sys.executable).with_name("pdcp")
 SCHEMAS = Path(__file__).resolve().parent / "schemas"

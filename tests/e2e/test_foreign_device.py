@@ -12,13 +12,13 @@ from itertools import pairwise
 
 import can
 import pytest
-from pdcp.events import CanFrame, DeviceLost
-from pdcp.wire import encode
 from programs import LINE_TIMEOUT_S, Pdcpd, until
 from rawhost import RawHost
 from simbus import open_sim_bus
 
 from pdcp import Channel, ChannelId, Device, Direction, ErrorCode, EventKind, Identity, RequestError
+from pdcp.events import CanFrame, DeviceLost
+from pdcp.wire import encode
 
 BEACON_MS = 300  # as the device tells; it beacons more often, so that it is not lost when the machine is busy
 BEACON_EACH_S = 0.05

@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from pdcp.wire import Frame, crc8, crc16, encode
 from programs import Pdcpd, until
 from rawhost import RawHost
 
 from pdcp import ChannelId, Identity, Link, LinkStatus
+from pdcp.wire import Frame, crc8, crc16, encode
 
 D1, D2, D3 = Identity(2, 2, 4), Identity(2, 2, 5), Identity(2, 2, 6)
 D3_DESCRIPTOR = "02 00 02 00 06 00 00 07"

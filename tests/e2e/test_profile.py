@@ -4,10 +4,10 @@ from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from pdcp.model import ProfileState
 from programs import Pdcpd, Program, Value, until
 
 from pdcp import Action, ChannelId, Client, Flags, Identity, LinkStatus
+from pdcp.model import ProfileState
 
 ROOT = Path(__file__).resolve().parents[2]
 D1, D2, D3, D4 = (Identity(2, 2, serial) for serial in (4, 5, 6, 7))

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.busload import BusLoad
 from pdcp.frames import BASE_ID_MAX, EXTENDED_ID_MAX, Frame
 from pdcp.stuffing import INTERFRAME_BITS, frame_bits

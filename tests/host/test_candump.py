@@ -6,6 +6,7 @@ import can
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.candump import format_frame, parse_line, read_log
 from pdcp.frames import BASE_ID_MAX, EXTENDED_ID_MAX, FD_SIZES, Frame, FrameError
 

@@ -11,6 +11,7 @@ import can
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.candump import format_frame
 from pdcp.capture import from_message, open_bus, open_frames, play, read_bus, read_capture, to_message
 from pdcp.frames import Frame

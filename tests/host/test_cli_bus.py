@@ -8,6 +8,7 @@ from pathlib import Path
 
 import can
 import pytest
+
 from pdcp.cli import app, bus
 from pdcp.cli.common import run
 

@@ -6,6 +6,7 @@ from io import BytesIO, TextIOWrapper
 from pathlib import Path
 
 import pytest
+
 from pdcp.cli import app, config
 from pdcp.cli.common import run
 

@@ -4,12 +4,12 @@ import json
 from collections.abc import Callable
 
 import pytest
-from pdcp.cli import app
-from pdcp.cli.common import run
-from pdcp.wire import Frame
 from scripted import Script, ScriptedArbitrator
 
 import pdcp
+from pdcp.cli import app
+from pdcp.cli.common import run
+from pdcp.wire import Frame
 
 INFO = bytes((1, 0, 1, 0, 64, 0xFF, 0x80, 2, 3, 2, 0))  # configuration 3 is active, two are stored
 

@@ -8,6 +8,9 @@ from collections.abc import Awaitable, Callable
 from typing import Any
 
 import pytest
+from scripted import Script, ScriptedArbitrator
+
+from pdcp import AsyncClient, Client, messages
 from pdcp.errors import ConnectionFailedError, ErrorCode, NoAnswerError, PdcpError, RequestError, ResetError
 from pdcp.events import DeviceBound, DeviceLost, Event, EventKind, LinkChanged
 from pdcp.model import (
@@ -26,9 +29,6 @@ from pdcp.model import (
     SystemInfo,
 )
 from pdcp.wire import Frame, Receiver, encode
-from scripted import Script, ScriptedArbitrator
-
-from pdcp import AsyncClient, Client, messages
 
 SENSOR, HAND = Identity(2, 2, 4), Identity(2, 2, 6)
 SENSOR_BYTES, HAND_BYTES = bytes.fromhex("02 00 02 00 04 00"), bytes.fromhex("02 00 02 00 06 00")

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.candump import parse_line, read_log
 from pdcp.decode import Decoded, Decoder, format_line, to_json
 from pdcp.frames import BASE_ID_MAX, EXTENDED_ID_MAX, Frame

@@ -3,11 +3,11 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from pdcp import messages as m
 from pdcp.messages import MESSAGES, Failure, FormatError, Message, Request, unpack
 from pdcp.model import ChannelId, Identity
 from pdcp.wire import Frame
-
-from pdcp import messages as m
 
 SENSOR = Identity(0x1234, 0x5678, 0x9ABC)
 HAND = Identity(0x0002, 0x0003, 0x0104)

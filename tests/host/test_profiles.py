@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.profiles import describe_type, parse_profile, profile_name, profile_path, profiles
 
 ROOT = Path(__file__).resolve().parents[2]

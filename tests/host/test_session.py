@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from pdcp import messages as m
 from pdcp.errors import (
     BadAnswerError,
     ConnectionFailedError,
@@ -22,8 +24,6 @@ from pdcp.events import BusState, BusStateChanged, DeviceBound
 from pdcp.model import ChannelId, Identity
 from pdcp.session import EVENTS_MAX, HELD_BYTES, Session, Ticket
 from pdcp.wire import Frame, Receiver, encode
-
-from pdcp import messages as m
 
 SENSOR = Identity(2, 2, 4)
 SET = m.SetParameter(ChannelId(SENSOR), 10, b"\xf4\x01")

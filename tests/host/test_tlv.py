@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.tlv import Channel, Configuration, Link, TlvError, from_yaml, parse, to_yaml
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+from pdcp import counters, events, parameters
 from pdcp.messages import EventMessage, FormatError
 from pdcp.model import ChannelId, Identity, LinkStatus
 from pdcp.parameters import Kind, bits_of, channels_of, find
-
-from pdcp import counters, events, parameters
 
 ROOT = Path(__file__).resolve().parents[2]
 numbers16 = st.integers(0, 0xFFFF)

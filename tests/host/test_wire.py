@@ -4,6 +4,7 @@ their checksums were computed with crcmod, by the polynomials of D-API-1."""
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
 from pdcp.wire import PAYLOAD_MAX, Frame, Receiver, crc8, crc16, encode
 
 SYSTEM_INFO = bytes.fromhex("FE 19 01 22 5A 23 00 00")

@@ -3,12 +3,12 @@
 import struct
 import time
 
-from pdcp.errors import NoAnswerError
-from pdcp.transport import SerialTransport
-from pdcp.wire import HEADER_SIZE, SYNC, Frame, encode
 from programs import LINE_TIMEOUT_S
 
 from pdcp import Client
+from pdcp.errors import NoAnswerError
+from pdcp.transport import SerialTransport
+from pdcp.wire import HEADER_SIZE, SYNC, Frame, encode
 
 
 class RawHost(Client):

@@ -9,10 +9,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from pdcp.events import UnknownEvent, parse
-from pdcp.messages import MESSAGES, EventMessage, FormatError
 from protocol_table import PLACE, Field, Table, TableError, built, load, sizes_of
 from protocol_table import parse as parse_table
+
+from pdcp.events import UnknownEvent, parse
+from pdcp.messages import MESSAGES, EventMessage, FormatError
 
 ROOT = Path(__file__).resolve().parents[2]
 SCRIPT = ROOT / "tools/gen_protocol.py"

@@ -130,8 +130,8 @@ static profile_phase_t next_part(profile_board_t *board)
 
 /* --- The end of a plan --- */
 
-/* The plan is made: writes down in the configuration what it has decided. Nothing is sent here; profile_carry.c
- * carries the plan out. */
+/* The plan is made: writes down in the configuration what it has decided. Nothing is sent here;
+ * profile_carry.c carries the plan out. */
 static profile_phase_t write_down(profile_board_t *board)
 {
     profile_board_forget_stand_ins(board);

@@ -30,7 +30,7 @@ typedef struct {
     uint32_t beacon_ms; /* when its last beacon left */
     uint32_t serial;
     uint16_t
-        held_ms;  /* the first grants were held for so long: taken off the start-up's quiet time (D-BUS-34) */
+        held_ms;  /* how long the first grants were held; taken off the start-up's quiet time (D-BUS-34) */
     uint8_t role; /* pdcp_role_t */
     bool restart; /* the controller is to be restarted */
     pdcp_host_request_t host;
@@ -39,7 +39,7 @@ typedef struct {
     pdcp_standby_t standby;
 } pdcp_arb_t;
 
-/* The device at this place, which must be one. */
+/* The device at this place, which must be below PDCP_DEVICES_MAX. */
 static inline pdcp_device_entry_t *pdcp_arb_device(pdcp_arb_t *arb, uint8_t place)
 {
     return pdcp_bus_device(&arb->bus, place);

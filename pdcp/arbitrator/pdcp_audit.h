@@ -1,16 +1,18 @@
-/* Audit (D-BUS-40): do the devices still have what the tables say?
+/* Audit: compares devices with the tables, and repairs what differs (D-BUS-40).
  *
- * A frame of somebody else, or a device that forgets, may stop all data while the tables call a link active.
- * So while nothing else is to be done, one parameter of one channel is read every PDCP_AUDIT_MS, in turn: of
- * outputs that feed a link transfer enabled (4) and node id (5), of inputs with an active link transfer
- * enabled and their source's node ids (7), of inputs what they name as their source (5, 6), where the profile
- * layer plans the links: a later arbitrator reads that back. Each fourth question is for transfer enabled of
- * a channel without a link.
+ * A foreign frame, or a device that forgets, may stop all data while the tables call a link active. So while
+ * there is nothing else to do, one parameter of one channel is read every PDCP_AUDIT_MS, in turn:
  *
- * What differs is counted, told (PDCP_EVENT_AUDIT) and repaired: a link is written again (pdcp_link_write), a
- * channel without one is silenced. After three repairs of one link within a minute it becomes inactive when
- * it differs again; what an input names as its source is then only told. Silence and refusal are no
- * differences. An answer is not compared if a link has changed since the question (pdcp_link_t, changed). */
+ *   outputs that feed a link      transfer enabled (4) and node id (5)
+ *   inputs with an active link    transfer enabled (4) and their source's node ids (7)
+ *   inputs                        the source that they name (5, 6), if the profile layer plans the links: a
+ *                                 later arbitrator reads it back
+ *   channels without a link       transfer enabled (4), as each fourth question
+ *
+ * A difference is counted, told (PDCP_EVENT_AUDIT) and repaired: a link is written again (pdcp_link_write), a
+ * channel without a link is silenced. A link that differs again after three repairs within a minute becomes
+ * inactive; a source named wrongly is then only told. Silence and refusal are not differences. An answer is
+ * not compared if a link has changed since the question (pdcp_link_t, changed). */
 #ifndef PDCP_AUDIT_H
 #define PDCP_AUDIT_H
 
@@ -24,22 +26,23 @@ enum {
     PDCP_AUDIT_REPAIRS = 3 /* of one link within a minute */
 };
 
-/* Nothing is known of the bus. What was begun goes on. */
+/* Forgets what was found on the bus. An audit that was begun continues. */
 void pdcp_audit_init(pdcp_bus_t *bus);
 
-/* Begins to ask. */
+/* Begins the audit. */
 void pdcp_audit_begin(pdcp_bus_t *bus);
 
-/* A device is set up: it is asked again what it has refused. */
+/* Lets a device that is set up again be asked what it refused before. */
 void pdcp_audit_on_ready(pdcp_bus_t *bus, uint8_t place);
 
-/* Somebody else has spoken to the device with this node id in the name of an arbitrator: it goes first. */
+/* Puts the device with this node id first: a foreign frame was sent to it. */
 void pdcp_audit_on_foreign(pdcp_bus_t *bus, uint8_t node_id);
 
-/* PDCP_TIMER_AUDIT is due; calm: nothing else is to be done, so a question may be asked. */
+/* Asks the next question: PDCP_TIMER_AUDIT is due. calm: there is nothing else to do, so a question may be
+ * asked. */
 void pdcp_audit_on_deadline(pdcp_bus_t *bus, bool calm);
 
-/* A reply to a question. Silence is no evidence (D-BUS-59). */
+/* Takes the reply to a question. Silence is no evidence (D-BUS-59). */
 void pdcp_audit_on_reply(pdcp_bus_t *bus, const pdcp_reply_t *reply);
 
 #endif

@@ -1,6 +1,5 @@
-/* What every part of the arbitrator shares: tables, deadlines, transmit queue, counters, and the way to tell
- * the application what has happened. Only the files of the arbitrator (pdcp_bind, _request, _setup, _link,
- * _audit, _suspend, _arb) use this. */
+/* What the parts of the arbitrator share: tables, deadlines, transmit queue, counters and events. Only files
+ * of pdcp/arbitrator use this. */
 #ifndef PDCP_BUS_H
 #define PDCP_BUS_H
 
@@ -22,11 +21,11 @@ typedef enum {
     PDCP_EVENT_IDENTITIES,   /* the table of remembered identities has changed */
     PDCP_EVENT_LINK, /* channel (an input): its link has changed; status: PDCP_OK or why it was not made */
     PDCP_EVENT_LINK_REQUEST, /* channel: the link that the host asked for is made, or status says why not */
-    PDCP_EVENT_RESET,        /* place: the reset that was asked for has ended with status */
+    PDCP_EVENT_RESET,        /* place: the requested reset has ended with status */
     PDCP_EVENT_FOREIGN,      /* another arbitrator is heard; this one stays (D-BUS-12) */
-    PDCP_EVENT_SILENT,       /* this arbitrator has gone on standby, all devices are forgotten (D-BUS-12) */
-    PDCP_EVENT_STARTED,      /* and has started afresh */
-    PDCP_EVENT_STATE,        /* the bus has another state; status holds it (pdcp_bus_state_t) */
+    PDCP_EVENT_SILENT,       /* this arbitrator is on standby now and has forgotten all devices (D-BUS-12) */
+    PDCP_EVENT_STARTED,      /* this arbitrator has taken over and starts afresh */
+    PDCP_EVENT_STATE,        /* status: the new state of the bus (pdcp_bus_state_t) */
     PDCP_EVENT_AUDIT,  /* channel: a parameter differs from the tables; status holds its id (D-BUS-40) */
     PDCP_EVENT_REQUEST /* place: the host's request has ended with status; len bytes of value */
 } pdcp_event_kind_t;
@@ -39,17 +38,17 @@ typedef struct {
     uint16_t len;
 } pdcp_event_t;
 
-/* Called from inside the arbitrator's functions, in the order in which things happen. Must not call back into
- * the arbitrator but to read its tables; the event is valid during the call. */
+/* Takes an event. Called from inside the arbitrator's functions, in the order in which things happen. It may
+ * read the arbitrator's tables and call nothing else of it. The event is valid during the call. */
 typedef void (*pdcp_event_fn)(void *ctx, uint32_t now_ms, const pdcp_event_t *event);
 
-/* Is this identity part of a limb that is stored? Same context as pdcp_event_fn; NULL stands for: of none. */
+/* Is this identity part of a stored limb? Same context as pdcp_event_fn. NULL: no identity is. */
 typedef bool (*pdcp_knows_fn)(void *ctx, const pdcp_identity_t *identity);
 
 /* Small state stands first here and in the structs around it: on the smallest part, a field that lies farther
  * than 511 bytes from the beginning costs twice the instructions. */
 typedef struct {
-    uint32_t now_ms;      /* of the call that the arbitrator is in: its functions note it first of all */
+    uint32_t now_ms;      /* time of the present call */
     uint32_t started_ms;  /* slides along behind: see pdcp_bus_age_ms */
     uint32_t silenced_ms; /* when an output answered last that it is not enabled any more */
     pdcp_event_fn on_event;
@@ -66,7 +65,7 @@ typedef struct {
     pdcp_unknown_t unknown;
 } pdcp_bus_t;
 
-/* The device at this place, which must be one. */
+/* The device at this place, which must be below PDCP_DEVICES_MAX. */
 pdcp_device_entry_t *pdcp_bus_device(pdcp_bus_t *bus, uint8_t place);
 
 /* Time since the start, PDCP_AGE_MAX_MS at most. */
@@ -77,19 +76,18 @@ void pdcp_bus_wake(pdcp_bus_t *bus, uint8_t timer, uint16_t in_ms);
 
 void pdcp_bus_count(pdcp_bus_t *bus, pdcp_stat_t stat);
 
-/* Puts a frame, or a message from the arbitrator, into the transmit queue. False: the queue is full, which is
- * counted. */
+/* Queues a frame, or a message from the arbitrator. False: the queue is full, which is counted. */
 bool pdcp_bus_send_frame(pdcp_bus_t *bus, const can_frame_t *frame);
 bool pdcp_bus_send(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, const pdcp_msg_t *msg);
 
-/* The same of a message that has no more than a code and a word. */
+/* Queues a message that consists of a code and a word. */
 bool pdcp_bus_send_word(pdcp_bus_t *bus, uint8_t priority, uint8_t node_id, uint8_t code, uint16_t word);
 
-/* Tells of a device (PDCP_NONE: of none), or of a channel: an input and its link. */
+/* Tells an event of a device (PDCP_NONE: of none), or of an input and its link. */
 void pdcp_bus_tell(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place, pdcp_status_t status);
 void pdcp_bus_tell_link(const pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t input, pdcp_status_t status);
 
-/* The same of a device, when there is no more to say. */
+/* Tells an event of a device, with status PDCP_OK. */
 void pdcp_bus_tell_device(pdcp_bus_t *bus, pdcp_event_kind_t kind, uint8_t place);
 
 #endif

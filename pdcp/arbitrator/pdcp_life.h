@@ -1,7 +1,7 @@
-/* The life of a device from its binding until it is forgotten: setup, beacons, loss (pdcp-bus.md 6 and 9).
+/* The life of a device: setup, beacons, loss, until it is forgotten (pdcp-bus.md 6 and 9).
  *
- * A device's place serves one request at a time: setup, link job, host, reset and identity check take turns,
- * and their replies go back to whoever asked. */
+ * A device's place serves one request at a time. Setup, link job, host, reset and identity check take turns,
+ * and each reply goes back to the part that asked. */
 #ifndef PDCP_LIFE_H
 #define PDCP_LIFE_H
 
@@ -12,21 +12,21 @@
 #include "pdcp_bind.h"
 #include "pdcp_request.h"
 
-/* Sets a device's deadline: it is lost, forgotten, or its held bind request is answered then. */
+/* Sets the time when a device is lost or forgotten, or when its held bind request is answered. */
 void pdcp_life_set(pdcp_arb_t *arb, uint8_t place, uint16_t in_ms);
 
-/* The beacon interval of a device may have become shorter: the deadline moves by itself only when it
- * fires. */
+/* Sets the deadline afresh, since the beacon interval may have become shorter. By itself the deadline moves
+ * only when it fires. */
 void pdcp_life_expect(pdcp_arb_t *arb, uint8_t place);
 
-/* A bind request of a device was answered. If it was granted, the setup begins afresh. */
+/* Begins the setup of a device whose bind request was granted. Other results: nothing. */
 void pdcp_life_after_bind(pdcp_arb_t *arb, uint8_t place, pdcp_bind_result_t result);
 
-/* A device's place may have become free for its next request: the check of its identity comes first, then the
- * host, then its reset and its setup. */
+/* Starts the next request to a device if its place is free: the check of its identity first, then the host's
+ * request, its reset, its setup. */
 void pdcp_life_serve(pdcp_arb_t *arb, uint8_t place);
 
-/* The device is gone; its ids are kept for it for a while (PDCP_LOST_KEPT_MS). */
+/* Declares a device lost. Its ids are kept for it for PDCP_LOST_KEPT_MS. */
 void pdcp_life_lose(pdcp_arb_t *arb, uint8_t place);
 
 /* Tells the device with this id to reset, at most once a second (D-BUS-15, D-BUS-37). It will then bind. */

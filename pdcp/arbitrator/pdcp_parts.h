@@ -1,8 +1,8 @@
-/* State of the arbitrator's parts: each struct belongs to one part, whose file alone writes it.
+/* State of the arbitrator's parts. Each struct belongs to one part, and only that part's file writes it.
  *
- * The structs stand here, below the parts, because pdcp_bus.h keeps one of each and pdcp_tables.h a request
- * for each device: so no header includes one of a part that stands above it. What the parts do with their
- * state say their own headers; exceptions to "alone" are named below.
+ * The structs stand here, below the parts, because pdcp_bus.h holds one of each and pdcp_tables.h a request
+ * for each device. So no header includes that of a part above it. The header of each part says what its state
+ * is for. Others write it only as this table says:
  *
  *   struct            its part       besides
  *   pdcp_request_t    pdcp_request
@@ -24,22 +24,22 @@
 #include "pdcp_limits.h"
 #include "pdcp_spec.h"
 
-/* How something has ended. */
+/* How something ended. */
 typedef enum {
     PDCP_OK = 0,
-    PDCP_ERR_NO_ANSWER = -1, /* silent through all tries, or lost meanwhile */
+    PDCP_ERR_NO_ANSWER = -1, /* no answer in all tries, or the device was lost */
     PDCP_ERR_REFUSED = -2,   /* answered with failure */
     PDCP_ERR_BULK = -3,    /* transfer failed PDCP_BULK_RESTARTS times, or the value is longer than allowed */
     PDCP_ERR_BUSY = -4,    /* not now: try again later */
     PDCP_ERR_UNKNOWN = -5, /* no such device or channel, or wrong direction */
     PDCP_ERR_OWN = -6,     /* an output never feeds an input of its own device (D-API-6) */
     PDCP_ERR_SOLE = -7,    /* another input wants the output for itself, as this one does (D-API-13) */
-    PDCP_ERR_DIFFERS = -8  /* the device does not keep what it is told (D-BUS-40) */
+    PDCP_ERR_DIFFERS = -8  /* the device does not keep what is written to it (D-BUS-40) */
 } pdcp_status_t;
 
 /* --- Requests (pdcp_request.h): one for each device, in pdcp_device_entry_t --- */
 
-/* Who asks a device. */
+/* Which part asks a device. */
 typedef enum {
     PDCP_CLIENT_NONE = 0,
     PDCP_CLIENT_SETUP,
@@ -47,8 +47,8 @@ typedef enum {
     PDCP_CLIENT_HOST,
     PDCP_CLIENT_RAW, /* the host, with a frame that is sent as it is */
     PDCP_CLIENT_RESET,
-    PDCP_CLIENT_BIND, /* is the device with this identity still there? */
-    PDCP_CLIENT_AUDIT /* the audit's questions, and the Release of what somebody else has suspended */
+    PDCP_CLIENT_BIND, /* the check whether a bound identity is still there */
+    PDCP_CLIENT_AUDIT /* the audit's questions, and the Release after a foreign Suspend */
 } pdcp_client_t;
 
 typedef enum {

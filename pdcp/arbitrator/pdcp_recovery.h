@@ -1,8 +1,7 @@
-/* Leaving bus-off (pdcp-bus.md 9): the controller is restarted after 100 ms, and when it goes off again,
- * after twice the time, up to 5 s. A controller that stayed on the bus for as long as the last pause starts
- * from 100 ms again.
+/* Recovery from bus-off (pdcp-bus.md 9.6). The controller is restarted after 100 ms. Each time that it goes
+ * off again the pause doubles, up to 5 s. After as long on the bus as the last pause it is 100 ms again.
  *
- * Pure policy: who owns the controller says what state it is in and restarts it when told. */
+ * Pure policy: the owner of the controller reports its state and restarts it when told. */
 #ifndef PDCP_RECOVERY_H
 #define PDCP_RECOVERY_H
 
@@ -22,7 +21,7 @@ typedef struct {
     uint32_t changed_ms; /* when the state was entered */
 } pdcp_recovery_t;
 
-/* The state of the controller. Returns the time from now after which it is to be restarted; 0: not at all. */
+/* Takes the state of the controller. Returns in how many ms to restart it; 0: no restart. */
 uint16_t pdcp_recovery_on_state(pdcp_recovery_t *recovery, uint32_t now_ms, pdcp_bus_state_t state);
 
 #endif

@@ -1,10 +1,10 @@
 /* Requests to a device (pdcp-bus.md 5): one at a time to one device, several devices at once.
  *
- * A request is sent, repeated after the device's acknowledgement time, PDCP_TRIES in all, and ends with
+ * A request is sent and repeated after the device's acknowledgement time, PDCP_TRIES in all. It ends with
  * exactly one reply whose done is true, unless it is cancelled. Values of more than four bytes go by bulk
- * transfer, as does a value that the device itself wants so. A raw request is a frame as the host made it,
- * whose answer is handed on whole. Which part of the arbitrator asked (the client) travels with the request
- * and comes back in the reply: this file decides nothing about it.
+ * transfer, and so does any value if the device wants it. A raw request is a frame that the host made; its
+ * answer is handed on whole. The request carries which part of the arbitrator asked (the client), and the
+ * reply returns it.
  *
  *   get, commands   IDLE --> ANSWER --> IDLE
  *   get by bulk     IDLE --> ANSWER --> GET_SIZE --> GET_DATA --> IDLE
@@ -22,7 +22,7 @@
 
 #include "pdcp_bus.h"
 
-/* What a message or a deadline has led to. */
+/* Result of a message or a deadline. */
 typedef struct {
     uint8_t client;
     int8_t status; /* pdcp_status_t; means something when done */

@@ -16,25 +16,24 @@
 
 #include "pdcp_arb_state.h"
 
-/* Begins with an empty bus: nothing is known of it; what is remembered and counted stays. The next beacon is
- * due at once. */
+/* Forgets the bus and begins afresh; remembered identities and counters stay. The next beacon is due at
+ * once. */
 void pdcp_role_begin(pdcp_arb_t *arb);
 
-/* The standby is over: the other arbitrator is gone, or serves no longer (D-BUS-42). */
+/* Ends the standby: the other arbitrator is gone, or does not serve any more (D-BUS-42). */
 void pdcp_role_take_over(pdcp_arb_t *arb);
 
-/* Sends nothing and listens: its own beacons have not left for too long, others may have taken over. */
+/* Begins to listen: its own beacons have not left for too long, and another may have taken over. */
 void pdcp_role_listen(pdcp_arb_t *arb);
 
-/* Drops what waits to be sent, and counts it. Without a bus what waits is stale when there is one again;
- * requests repeat themselves, and an answer to what has been given up long ago would be taken for that to a
- * newer one (D-BUS-28). */
+/* Discards and counts the frames that wait to be sent. They are stale when the bus is back: requests repeat
+ * themselves, and the answer to an old one would be taken for that to a newer one (D-BUS-28). */
 void pdcp_role_discard_queue(pdcp_arb_t *arb);
 
-/* A frame in the name of an arbitrator (mode 1). */
+/* Takes a frame in the name of an arbitrator (mode 1). */
 void pdcp_role_on_arbitrator_frame(pdcp_arb_t *arb, const can_frame_t *frame);
 
-/* A frame of a device while this arbitrator is on standby. True: a bind request that the other one has to
+/* Takes a frame of a device on standby. True: it is a bind request that the other arbitrator has to
  * answer. */
 bool pdcp_role_on_standby_frame(pdcp_arb_t *arb, const can_frame_t *frame);
 

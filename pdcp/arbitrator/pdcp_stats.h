@@ -1,4 +1,4 @@
-/* Counters of the bus: every frame that is dropped is counted by its cause, and the host can read them all.
+/* Counters of the bus. Every dropped frame is counted by its cause, and the host can read all counters.
  *
  * The order is part of the host API (2413h, D-API-5): append, never insert. All are 32-bit and wrap. Every
  * received frame is counted in exactly one of the DROP counters, CHANNEL_DATA, FOREIGN_BEACON or TAKEN. */
@@ -10,8 +10,8 @@
 typedef enum {
     PDCP_STAT_RX = 0,  /* frames handed to the arbitrator */
     PDCP_STAT_TX,      /* frames handed to the controller */
-    PDCP_STAT_TX_FULL, /* a full transmit queue lost a frame, the new or the least urgent one; a request is
-                          repeated */
+    PDCP_STAT_TX_FULL, /* frames lost to a full transmit queue, the new or the least urgent one; requests
+                          are repeated */
     PDCP_STAT_DROP_EXTENDED,   /* 29-bit identifier */
     PDCP_STAT_DROP_REMOTE,     /* remote frame */
     PDCP_STAT_DROP_ERROR,      /* error report of the controller */
@@ -24,8 +24,8 @@ typedef enum {
     PDCP_STAT_DROP_BAD_CODE,   /* reserved or device-specific function code, or no data */
     PDCP_STAT_DROP_DIRECTION,  /* function code that a device must not send */
     PDCP_STAT_DROP_DEPRECATED, /* deprecated function code, not answered (D-BUS-4) */
-    PDCP_STAT_DROP_LATE,       /* answer that nobody waits for, or not any more */
-    PDCP_STAT_DROP_BINDING,    /* P=3 frame that is no bind request */
+    PDCP_STAT_DROP_LATE,       /* answer that nobody waits for */
+    PDCP_STAT_DROP_BINDING,    /* P=3 frame other than a bind request */
     PDCP_STAT_CHANNEL_DATA,    /* frames from output channels, not for the arbitrator */
     PDCP_STAT_BIND_GRANTED,
     PDCP_STAT_BIND_SUGGESTED,
@@ -33,18 +33,18 @@ typedef enum {
     PDCP_STAT_BIND_DUPLICATE, /* a second device with the identity of a bound one */
     PDCP_STAT_REQUESTS,       /* to devices, repetitions not counted */
     PDCP_STAT_REPEATS,
-    PDCP_STAT_NO_ANSWER, /* requests that failed for want of an answer */
+    PDCP_STAT_NO_ANSWER, /* requests that failed without an answer */
     PDCP_STAT_BULK_RESTARTS,
     PDCP_STAT_SETUP_FAILED,  /* devices left bound but unlinked */
-    PDCP_STAT_NO_ROOM,       /* channels or their needs that found their table full */
+    PDCP_STAT_NO_ROOM,       /* channels, needs or held requests that found their table full */
     PDCP_STAT_LOST,          /* devices lost */
     PDCP_STAT_LINK_FAILED,   /* links that could not be made and were undone */
     PDCP_STAT_UNKNOWN_RESET, /* Reset Device sent to an id that is not bound (D-BUS-15) */
-    PDCP_STAT_TAKEN,         /* frames for the arbitrator that it has made use of */
+    PDCP_STAT_TAKEN,         /* frames that the arbitrator has used */
     PDCP_STAT_DROP_SILENT,   /* everything but foreign beacons while on standby (D-BUS-12) */
     PDCP_STAT_TX_DISCARDED,  /* frames that waited while the bus was off */
     PDCP_STAT_BUS_OFF,       /* times that the controller went off the bus */
-    PDCP_STAT_AUDIT,         /* parameters of channels that were not as the tables say (D-BUS-40) */
+    PDCP_STAT_AUDIT,         /* parameters of channels that differed from the tables (D-BUS-40) */
     PDCP_STAT_COUNT
 } pdcp_stat_t;
 

@@ -1,7 +1,7 @@
-/* One step of a job of the links: a request about one parameter of one channel.
+/* One step of a link job: a request about one parameter of one channel.
  *
- * Only pdcp_job calls these functions, while a job is under way; they look at it (bus->link.job) and write to
- * the tables, but leave the job itself as it is. */
+ * Only pdcp_job calls these functions, while a job is under way. They read the job (bus->link.job) and write
+ * to the tables, but do not change the job. */
 #ifndef PDCP_STEP_H
 #define PDCP_STEP_H
 
@@ -26,7 +26,7 @@ typedef enum {
     PDCP_STEP_END
 } pdcp_step_t;
 
-/* What has come of a step. */
+/* Outcome of a step. */
 typedef enum {
     PDCP_STEP_SENT,      /* its request is under way */
     PDCP_STEP_NOTHING,   /* there is nothing to write in it */
@@ -40,14 +40,14 @@ static inline bool pdcp_step_is_reading(uint8_t step)
     return step <= PDCP_STEP_READ_SERIAL;
 }
 
-/* The channel that the current step is about; NULL: the job has none, or it is gone. */
+/* The channel of the current step. NULL: the job has none, or it is gone. */
 pdcp_channel_t *pdcp_step_channel(pdcp_bus_t *bus);
 
 /* Sends the request of the current step. */
 pdcp_step_result_t pdcp_step_send(pdcp_bus_t *bus);
 
-/* Takes the answered step over into the tables. False: the device names another source than they do, which
- * only UPDATE takes over. */
+/* Writes the answered step into the tables. False: the device names another source than the tables, and only
+ * UPDATE takes that over. */
 bool pdcp_step_take(pdcp_bus_t *bus, const pdcp_reply_t *reply);
 
 #endif

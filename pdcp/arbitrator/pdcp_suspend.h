@@ -18,27 +18,27 @@ enum {
     PDCP_RELEASE_AGAIN_MS = 1000 /* until a device that did not answer is told again */
 };
 
-/* The host has sent Suspend, for time_ms, 0: until released, or Release; to a device or (PDCP_NONE) to
+/* Notes that the host has sent Suspend (time_ms 0: until released) or Release to a device, PDCP_NONE: to
  * all. */
 void pdcp_suspend_on_host(pdcp_bus_t *bus, uint8_t place, uint8_t code, uint16_t time_ms);
 
-/* A device was bound: it is not suspended. */
+/* Notes that a device was bound: it is not suspended. */
 void pdcp_suspend_on_bound(pdcp_bus_t *bus, uint8_t place);
 
-/* Somebody else has sent Suspend to this node id, 0: to all. */
+/* Notes a foreign Suspend to this node id, 0: to all. */
 void pdcp_suspend_on_foreign(pdcp_bus_t *bus, uint8_t node_id);
 
-/* A beacon of the arbitrator leaves: half a second has passed. */
+/* Counts half a second: a beacon of the arbitrator leaves. */
 void pdcp_suspend_on_beacon(pdcp_bus_t *bus);
 
-/* A device is lost, its request not yet cancelled: a Release that was not answered is due again when it is
+/* Notes that a device is lost, before its request is cancelled: an unanswered Release is due again when it is
  * back. */
 void pdcp_suspend_on_lost(pdcp_bus_t *bus, uint8_t place);
 
-/* A device was told Release. */
+/* Takes the outcome of a Release. */
 void pdcp_suspend_on_reply(pdcp_bus_t *bus, uint8_t place, pdcp_status_t status);
 
-/* PDCP_TIMER_RELEASE is due: devices are told Release as their places are free. */
+/* Sends Release to the devices whose places are free: PDCP_TIMER_RELEASE is due. */
 void pdcp_suspend_on_deadline(pdcp_bus_t *bus);
 
 #endif

@@ -1,8 +1,8 @@
-/* The tables of the bus: which devices there are, what channels they have, and whose every node id is.
+/* Tables of the bus: the devices, their channels, and the owner of each node id.
  *
- * A device has a place (0 to PDCP_DEVICES_MAX - 1) from its binding until it is forgotten; its channels form
- * a list in the order of their indices in one pool. PDCP_NONE stands for no place and no channel. Looking up
- * a node id costs one read. Plain data: no frames, no time passes here. */
+ * A device has a place (0 to PDCP_DEVICES_MAX - 1) from its binding until it is forgotten. Its channels form
+ * a list in one pool, ordered by channel index. PDCP_NONE stands for no place and no channel. Looking up a
+ * node id costs one read. Plain data: nothing here knows frames or time. */
 #ifndef PDCP_TABLES_H
 #define PDCP_TABLES_H
 
@@ -54,11 +54,11 @@ typedef struct {
     uint8_t channel_count;
     uint8_t first_channel; /* number in the pool, PDCP_NONE: has none */
     bool beaconed;         /* counts for the host (D-BUS-6) */
-    bool taken_back;       /* it beaconed while lost; who it is has not been read yet (D-BUS-15) */
+    bool taken_back;       /* it beaconed while lost; its identity has not been read yet (D-BUS-15) */
     bool reset_asked;      /* Reset Device is to be sent, or is under way */
     bool asked_again;      /* its identity asked to bind while it is bound (D-BUS-6) */
     uint8_t asked_id;      /* with this id; also of a request that is held */
-    bool setup_again;      /* it was left before: tried once more, silently (D-BUS-17) */
+    bool setup_again;      /* its setup failed before: the next failure is not told (D-BUS-17) */
     uint8_t setup_pass;    /* pdcp_setup.c */
     uint8_t setup_step;
     uint8_t setup_channel;
@@ -82,7 +82,7 @@ typedef enum {
     PDCP_TODO_CONNECT = 4, /* input: make the link to the source that it has */
     PDCP_TODO_UPDATE = 8,  /* input: its device has sent Update Data Channel */
     PDCP_TODO_WRITE = 16,  /* input: write what the tables say: its source, of an active link all of it */
-    PDCP_TODO_AGAIN = 32   /* silence it: the write before was not answered, and everybody else comes first */
+    PDCP_TODO_AGAIN = 32   /* silence it once more: the last try was not answered; all else comes first */
 } pdcp_todo_t;
 
 typedef struct {
@@ -93,7 +93,7 @@ typedef struct {
     uint8_t next;     /* the owner's next channel, PDCP_NONE: the last */
     uint8_t transfer; /* PDCP_INPUT, PDCP_OUTPUT, 0: not known yet */
     uint8_t node_id;  /* outputs: their own; inputs: the output's that parameter 7 may name; 0 = none */
-    bool enabled;     /* transfer is or may be enabled: 1 was written, and 0 was not answered since */
+    bool enabled;     /* transfer may be enabled: 1 was written, and no 0 has been answered since */
     uint8_t todo;     /* a set of pdcp_todo_t */
     /* Inputs only: */
     uint8_t link; /* pdcp_link_status_t */
@@ -112,39 +112,39 @@ typedef struct {
 
 void pdcp_tables_init(pdcp_tables_t *tables);
 
-/* Place of the device with this identity, in any state but free; PDCP_NONE: there is none. */
+/* Place of the device with this identity, in any state but FREE. PDCP_NONE: there is none. */
 uint8_t pdcp_tables_find(const pdcp_tables_t *tables, const pdcp_identity_t *identity);
 
-/* A place for one more device; PDCP_NONE: there is none. */
+/* A free place. PDCP_NONE: there is none. */
 uint8_t pdcp_tables_free_place(const pdcp_tables_t *tables);
 
-/* Takes a free place for a device with this node id, which must be free. */
+/* Puts a device with this node id into a place. Both must be free. */
 void pdcp_tables_add(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t *identity, uint8_t node_id);
 
-/* Takes a free place for a device whose bind request is held. */
+/* Puts a device whose bind request is held into a place, which must be free. */
 void pdcp_tables_hold(pdcp_tables_t *tables, uint8_t place, const pdcp_identity_t *identity);
 
-/* Is there a device at this place that can be asked: bound, and not lost? place: any number. */
+/* Is there a bound device at this place, and not lost? place: any number. */
 bool pdcp_tables_is_bound(const pdcp_tables_t *tables, uint8_t place);
 
-/* How many places are in this state. */
+/* Number of places in this state. */
 uint8_t pdcp_tables_count_state(const pdcp_tables_t *tables, pdcp_place_state_t state);
 
-/* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep their source, but feed
- * nothing. */
+/* Forgets a device: its place, node ids, channels and needs. Inputs that it fed keep the name of their
+ * source, but hear nothing. */
 void pdcp_tables_remove(pdcp_tables_t *tables, uint8_t place);
 
-/* Gives a device exactly count channels, indices 1 to count, keeping those that it has. False: the pool is
- * too small; nothing is changed. */
+/* Gives a device exactly count channels, indices 1 to count, and keeps those that it has. False: the pool is
+ * too small, and nothing has changed. */
 bool pdcp_tables_set_channels(pdcp_tables_t *tables, uint8_t place, uint8_t count);
 
 /* Channel number of a device's channel index; PDCP_NONE: it has no such channel. */
 uint8_t pdcp_tables_channel(const pdcp_tables_t *tables, uint8_t place, uint8_t index);
 
-/* Makes the source of an input that of an unconnected one (D-BUS-7). */
+/* Makes an input unconnected (D-BUS-7). */
 void pdcp_tables_clear_source(pdcp_channel_t *input);
 
-/* Takes over a parameter that names the source of an input: 5, 6 or 8, its two numbers of 16 bits. */
+/* Takes parameter 5, 6 or 8 of an input, as two numbers of 16 bits: a part of its source's name. */
 void pdcp_tables_take_source(pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
 /* Does this channel index name a source? An unconnected input has FFh (D-BUS-7). */
@@ -153,11 +153,11 @@ static inline bool pdcp_tables_is_named(uint8_t index)
     return index != PDCP_NO_SOURCE_INDEX && index != 0;
 }
 
-/* Do the numbers of such a parameter say what the tables say? */
+/* Does such a parameter say what the tables say? */
 bool pdcp_tables_is_source(const pdcp_channel_t *input, uint8_t param, uint16_t low, uint16_t high);
 
-/* Makes room for what the channels of a device need, once their directions are known; all bits 0. False: no
- * room, the device then has no needs. */
+/* Makes room for the needs of a device's channels, all bits 0, once their directions are known. False: there
+ * is no room, and the device has no needs. */
 bool pdcp_tables_make_needs(pdcp_tables_t *tables, uint8_t place);
 
 /* Stores a piece of a channel's bit string of required or desired channels: len bytes from byte offset on,
@@ -166,30 +166,30 @@ bool pdcp_tables_make_needs(pdcp_tables_t *tables, uint8_t place);
 void pdcp_tables_put_needs(pdcp_tables_t *tables, uint8_t channel, bool desired, uint16_t offset,
                            const uint8_t *bytes, uint16_t len);
 
-/* Does channel need (or desire) the input with this index of its own device, which must have room for
- * needs? */
+/* Does the channel require (or desire) the input of its own device with this index? The device must have room
+ * for needs. */
 bool pdcp_tables_needs(const pdcp_tables_t *tables, uint8_t channel, bool desired, uint8_t index);
 
-/* No input is fed by this channel any more: it is gone, or no output now. */
+/* Unlinks a channel from all inputs that it feeds: it is gone, or it is not an output any more. */
 void pdcp_tables_drop_source(pdcp_tables_t *tables, uint8_t channel);
 
-/* May an input still listen to this node id? It may until 0 was answered, in parameter 7 or to transfer
+/* May an input still listen to this node id? It may until it has answered a 0 in parameter 7 or in transfer
  * enabled (D-BUS-36). */
 bool pdcp_tables_may_hear(const pdcp_tables_t *tables, uint8_t node_id);
 
-/* Channel number of the output of a device that has this node id; PDCP_NONE: it has none. */
+/* Channel number of a device's output with this node id. PDCP_NONE: there is none. */
 uint8_t pdcp_tables_output(const pdcp_tables_t *tables, uint8_t place, uint8_t node_id);
 
-/* The input that keeps this one, which must be another's, from the output, because both want it for
- * themselves (D-API-13); PDCP_NONE: there is none. An inactive link counts, since it comes back, but less
- * than one that works; so does that which the input itself has to this output. */
+/* The input that keeps this one from the output because both want sole access (D-API-13). PDCP_NONE: there is
+ * none. Output and input must be of different devices. An inactive link counts, since it comes back, but less
+ * than an active one; so does the link that the input itself has to this output. */
 uint8_t pdcp_tables_rival(const pdcp_tables_t *tables, uint8_t output, uint8_t input);
 
-/* Gives an output the node id, which must be free; gives back the one it had. 0: only gives back. */
+/* Gives an output this node id, which must be free, and takes its old one away. 0: only takes it away. */
 void pdcp_tables_set_output_id(pdcp_tables_t *tables, pdcp_channel_t *output, uint8_t node_id);
 
-/* Is the node id the device's own (true), or that of one of its outputs (false)? node: place of the owner,
- * PDCP_NONE: nobody has this id. */
+/* Finds the owner of a node id. *place: the owner's place, PDCP_NONE: the id has no owner. True: the id is
+ * the device's own. False: it is that of one of its outputs. */
 static inline bool pdcp_tables_owner(const pdcp_tables_t *tables, uint8_t node_id, uint8_t *place)
 {
     const uint8_t owner = tables->owner[node_id];
@@ -197,7 +197,7 @@ static inline bool pdcp_tables_owner(const pdcp_tables_t *tables, uint8_t node_i
     return (owner & 0x80u) == 0;
 }
 
-/* What counts for the host: a device from its first beacon until it is lost, its channels when it is set up
+/* What the host sees: a device from its first beacon until it is lost, its channels once it is set up
  * (D-API-6). A link is named by its input's channel number. */
 enum {
     PDCP_COUNTS_LINK = 0,
@@ -206,8 +206,8 @@ enum {
     PDCP_COUNTS_DEVICE
 };
 
-/* The number-th (from 1) of what counts, and how many there are. PDCP_NONE: there are fewer. Order: places,
- * then channel indices. */
+/* The number-th (from 1) of what the host sees, PDCP_NONE: there are fewer; and how many there are. Ordered
+ * by place, then by channel index. */
 uint8_t pdcp_tables_nth(const pdcp_tables_t *tables, uint8_t kind, uint8_t number);
 uint8_t pdcp_tables_count(const pdcp_tables_t *tables, uint8_t kind);
 

@@ -1,7 +1,7 @@
 /* A CAN frame as every room of the house passes it on.
  *
- * This is the one type that pdcp/ shares with hal/: it holds what a controller reports and nothing of
- * what PDCP makes of it. Times do not travel with the frame: who receives it says when. */
+ * pdcp/ shares only this type with hal/. It holds what a controller reports, and nothing of what PDCP makes
+ * of it. A frame carries no time: whoever hands it on says when it came. */
 #ifndef CAN_FRAME_H
 #define CAN_FRAME_H
 
@@ -10,8 +10,8 @@
 #define CAN_FRAME_DATA_MAX 8u
 #define CAN_FRAME_ID_MAX 0x7FFu
 
-/* What came from the wire. PDCP uses CAN_FRAME_BASE alone; the others exist so that they can be
- * counted by cause instead of vanishing in a driver [PDCP 2.2]. */
+/* Kind of a frame. PDCP uses CAN_FRAME_BASE only. The others exist to be counted by cause instead of
+ * vanishing in a driver [PDCP 2.2]. */
 typedef enum {
     CAN_FRAME_BASE = 0,     /* CAN 2.0A data frame, 11-bit identifier */
     CAN_FRAME_EXTENDED = 1, /* data frame with a 29-bit identifier */

@@ -1,4 +1,4 @@
-/* Sets of small numbers, a bit for each: channels, places of devices, node ids. */
+/* Sets of small numbers, one bit each: channel numbers, places, node ids. */
 #ifndef PDCP_BITS_H
 #define PDCP_BITS_H
 

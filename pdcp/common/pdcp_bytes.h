@@ -1,7 +1,7 @@
-/* Numbers and identities as bytes. A CAN frame, a host message, a stored record and a configuration string
- * hold them alike: least significant byte first (D-BUS-1).
+/* Numbers and identities as bytes, least significant byte first (D-BUS-1). CAN frames, host messages, stored
+ * records and configuration strings all hold them in this way.
  *
- * Pure functions. Whoever calls one without a length owns as many bytes as the name says. */
+ * Pure functions. Without a length the caller owns as many bytes as the name says. */
 #ifndef PDCP_BYTES_H
 #define PDCP_BYTES_H
 
@@ -18,7 +18,7 @@ void pdcp_bytes_put_u32(uint8_t bytes[4], uint32_t number);
 pdcp_identity_t pdcp_bytes_get_identity(const uint8_t bytes[PDCP_BYTES_IDENTITY]);
 void pdcp_bytes_put_identity(uint8_t bytes[PDCP_BYTES_IDENTITY], const pdcp_identity_t *identity);
 
-/* Reads the field that begins at byte at of a parameter's value, which has len bytes. A value may be shorter
+/* Reads the field at byte `at` of a parameter's value, which has len bytes. A value may be shorter
  * or longer than its fields: missing bytes are 0, extra ones are ignored (pdcp-bus.md 4). */
 uint8_t pdcp_bytes_value_u8(const uint8_t *value, uint16_t len, uint16_t at);
 uint16_t pdcp_bytes_value_u16(const uint8_t *value, uint16_t len, uint16_t at);

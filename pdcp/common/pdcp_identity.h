@@ -1,4 +1,4 @@
-/* Who a device is. */
+/* Identity of a device. */
 #ifndef PDCP_IDENTITY_H
 #define PDCP_IDENTITY_H
 

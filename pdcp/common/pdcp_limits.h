@@ -1,5 +1,5 @@
-/* Capacities of the bus: every table of pdcp/common and pdcp/arbitrator gets its size here and nowhere else.
- * The other rooms have theirs in pdcp_device_limits.h, profile_limits.h and arb_limits.h.
+/* Capacities of the bus: the size of every table of pdcp/common and pdcp/arbitrator. The other rooms have
+ * theirs in pdcp_device_limits.h, profile_limits.h and arb_limits.h.
  *
  * The numbers are those of the smallest part, a dsPIC33FJ64MC802 with 16 KB RAM (pdcp-bus.md 11). A larger
  * part may define its own before this header is read (-DPDCP_DEVICES_MAX=64). */
@@ -10,7 +10,7 @@
 #define PDCP_DEVICES_MAX 32 /* bound at a time; 1 to 64 (the reset bitmap of the host API has 64 bits) */
 #endif
 
-/* Places that identities which are not known may take; the others are kept for known ones (D-BUS-43). */
+/* Places that unknown identities may take. The others are kept for known ones (D-BUS-43). */
 #define PDCP_UNKNOWN_PLACES (PDCP_DEVICES_MAX - PDCP_DEVICES_MAX / 4)
 
 #ifndef PDCP_CHANNELS_MAX
@@ -35,7 +35,7 @@
 #define PDCP_NEEDS_BYTES 320
 #endif
 
-/* Channels whose differences the audit counts at a time; those of others are not counted. */
+/* Channels whose differences the audit counts at the same time. */
 #define PDCP_AUDIT_FOUND_MAX 8
 
 /* Longest parameter value that passes between host and device (D-BUS-13). */

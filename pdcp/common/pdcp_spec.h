@@ -68,8 +68,8 @@ enum {
 /* Transfer type, parameter 3 of a channel. */
 enum { PDCP_INPUT = 1, PDCP_OUTPUT = 2 };
 
-/* The one bit of an input's type that is not the profile layer's alone: it wants its source for itself, no
- * other such input may have the same one [PROFILE listing 4.9]. */
+/* Sole access, a bit of an input's type: no other such input may share its source [PROFILE listing 4.9]. The
+ * bus needs this bit too; the others are the profile layer's. */
 #define PDCP_TYPE_SOLE 0x0200u
 
 /* Source of an unconnected input (D-BUS-7). */
@@ -81,7 +81,7 @@ enum { PDCP_BULK_PACKET_MAX = 6, PDCP_VALUE_MAX = 4, PDCP_BULK_RESTARTS = 3 };
 
 /* Times in ms. */
 enum {
-    PDCP_BIND_TIMEOUT_MS = 1000,    /* a suggested id is reserved so long (D-BUS-6) */
+    PDCP_BIND_TIMEOUT_MS = 1000,    /* how long a suggested id is reserved (D-BUS-6) */
     PDCP_ACK_MS = 100,              /* acknowledgement time when the device names none */
     PDCP_ACK_MIN_MS = 20,           /* D-BUS-13 */
     PDCP_ACK_MAX_MS = 500,          /* D-BUS-13 */
@@ -96,33 +96,33 @@ enum {
     PDCP_DEVICE_SILENCE_MS = 3000,  /* device role: arbitrator gone (D-BUS-16) */
     PDCP_SETUP_PAUSE_MS = 250,      /* between two attempts to set a device up (D-BUS-17) */
     PDCP_SETUP_ATTEMPTS = 5,        /* D-BUS-17 */
-    PDCP_SETUP_AGAIN_MS = 5000,     /* until a device that was left is tried once more (D-BUS-17) */
+    PDCP_SETUP_AGAIN_MS = 5000,     /* until a failed setup is tried once more (D-BUS-17) */
     PDCP_HOST_WAIT_MS = 1000,       /* longest wait of the host's request for its turn (D-API-10) */
-    PDCP_LINK_PAUSE_MS = 500,       /* until a link that was not answered is tried again (D-BUS-26) */
+    PDCP_LINK_PAUSE_MS = 500,       /* until an unanswered link is tried again (D-BUS-26) */
     PDCP_STANDBY_MS = 1600,         /* on standby without a foreign beacon: take over, plus the spread */
     PDCP_STANDBY_SPREAD_MS = 500,   /* by serial number (D-BUS-35) */
-    PDCP_FOREIGN_MS = 2000,         /* what was heard of another arbitrator counts so long (D-BUS-42) */
+    PDCP_FOREIGN_MS = 2000,         /* how long a frame of another arbitrator counts (D-BUS-42) */
     PDCP_HOLD_MS = 5,               /* without devices of its own: bind requests are held, plus the spread */
     PDCP_HOLD_SPREAD_MS = 32,       /* by serial number (D-BUS-42) */
-    PDCP_HOLD_SETUPS = 2,           /* of many that are held so many are set up at once, */
-    PDCP_HOLD_PACE_MS = 7,          /* and the others follow: about what a setup takes */
-    PDCP_HOLD_FOREIGN_MS = 600,     /* and so long at least after a foreign beacon (D-BUS-42) */
+    PDCP_HOLD_SETUPS = 2,           /* held requests that are granted at once; */
+    PDCP_HOLD_PACE_MS = 7,          /* the others follow one by one, about one setup apart */
+    PDCP_HOLD_FOREIGN_MS = 600,     /* minimum hold after a foreign beacon (D-BUS-42) */
     PDCP_YIELD_MS = 3000,        /* with devices of its own: goes on standby for another, plus the spread */
     PDCP_YIELD_SPREAD_MS = 2000, /* by serial number (D-BUS-42) */
-    PDCP_HUNG_MS = 1600,         /* its last beacon left longer ago: it listens first (D-BUS-42) */
-    PDCP_LISTEN_MS = 600,        /* so long */
-    PDCP_UNBOUND_WAIT_MS = 250,  /* on standby: a bind request is answered within (D-BUS-42) */
-    PDCP_UNBOUND_MAX = 3,        /* so many in a row without an answer, */
-    PDCP_UNBOUND_MS = 1000,      /* over so long, show that the other one serves no longer */
+    PDCP_HUNG_MS = 1600,         /* age of its last beacon that makes it listen first (D-BUS-42) */
+    PDCP_LISTEN_MS = 600,        /* how long it then listens */
+    PDCP_UNBOUND_WAIT_MS = 250,  /* on standby: time for the answer to a bind request (D-BUS-42) */
+    PDCP_UNBOUND_MAX = 3,        /* unanswered requests in a row, */
+    PDCP_UNBOUND_MS = 1000,      /* over at least this time, show that the other does not serve */
     PDCP_RECOVERY_MS = 100,      /* first pause before leaving bus-off, doubling */
     PDCP_RECOVERY_MAX_MS = 5000,
-    PDCP_YOUNG_MS = 1200,   /* first time of an arbitrator: no Reset to unknown devices (D-BUS-15) */
-    PDCP_CLOSED_MS = 500,   /* first time of an arbitrator: no output is enabled (D-BUS-36) */
-    PDCP_SHUT_MS = 11000,   /* and if an unknown id is heard in it: no output id is given (D-BUS-36) */
-    PDCP_FADING_MS = 100,   /* a disabled output may send what it has queued (D-BUS-36) */
-    PDCP_CROWD_MS = 600,    /* unknown identities may take all places (D-BUS-43) */
-    PDCP_GHOST_MS = 300,    /* one of them that is not heard after its grant is forgotten (D-BUS-43) */
-    PDCP_AGE_MAX_MS = 20000 /* longer than any time that is counted from the start */
+    PDCP_YOUNG_MS = 1200,   /* after the start: no Reset to unknown devices (D-BUS-15) */
+    PDCP_CLOSED_MS = 500,   /* after the start: no output is enabled (D-BUS-36) */
+    PDCP_SHUT_MS = 11000,   /* after the start, if an unknown id is heard: no output id (D-BUS-36) */
+    PDCP_FADING_MS = 100,   /* a disabled output may still send what it queued (D-BUS-36) */
+    PDCP_CROWD_MS = 600,    /* after the start: unknown identities may take all places (D-BUS-43) */
+    PDCP_GHOST_MS = 300,    /* after its grant: an unknown identity not heard is forgotten (D-BUS-43) */
+    PDCP_AGE_MAX_MS = 20000 /* more than any time counted from the start */
 };
 
 #endif

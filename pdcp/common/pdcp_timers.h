@@ -1,5 +1,5 @@
-/* Deadlines in a binary heap: the earliest is known at once, and setting or cancelling one costs a walk of at
- * most log2(PDCP_TIMERS_MAX) levels, never a scan of all devices. */
+/* Deadlines in a binary heap. The earliest one is known at once. Setting or cancelling one costs at most
+ * log2(PDCP_TIMERS_MAX) levels, never a scan of all devices. */
 #ifndef PDCP_TIMERS_H
 #define PDCP_TIMERS_H
 

@@ -1,6 +1,6 @@
-/* Frames that wait for the controller, in the order in which they would win arbitration: by identifier,
- * oldest first among equals. An urgent frame overtakes all others, and pushes the least urgent one out when
- * the queue is full: a queue full of low priority never keeps a beacon or a link change waiting. */
+/* Transmit queue: frames in the order in which they win arbitration, by identifier, oldest first among
+ * equals. An urgent frame overtakes the others. When the queue is full it pushes the least urgent one out, so
+ * that frames of low priority never keep a beacon or a link change waiting. */
 #ifndef PDCP_TXQ_H
 #define PDCP_TXQ_H
 

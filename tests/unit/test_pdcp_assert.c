@@ -1,5 +1,5 @@
-/* What the headers demand is checked (pdcp_assert.h): each of these breaks one demand, and the check names its header
- * and clause. */
+/* What the headers demand is checked (pdcp_assert.h): each of these breaks one demand, and the check names
+ * its header and clause. */
 #include "pdcp_assert.h"
 
 #include <setjmp.h>

@@ -1,5 +1,5 @@
-/* Error codes of the host's failure answers (D-API-4). Whatever the host may ask for says one of them, so
- * they stand below the host API. */
+/* Error codes of failure answers to the host (D-API-4). Storage and limb return them too, so they stand below
+ * the host API. */
 #ifndef ARB_ERROR_H
 #define ARB_ERROR_H
 

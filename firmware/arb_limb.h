@@ -37,10 +37,10 @@ typedef struct {
     uint8_t stage;    /* arb_limb.c: what is under way */
     uint8_t number;   /* configuration that is being read, saved, loaded or erased */
     int8_t status;    /* of the job of arb_config that has ended: arb_config_status_t */
-    bool ended;       /* what the host waits for is there: */
+    bool ended;       /* the outcome is there: */
     uint8_t error;    /* ARB_ERR_... (arb_error.h) */
     uint16_t result;
-    bool told;           /* active and stored configurations are as the host knows them */
+    bool told;           /* the host knows of all changes of active and stored configurations */
     bool unsaved;        /* the configuration was changed, for auto-save */
     uint32_t save_ms;    /* auto-save: when it is due */
     uint8_t best;        /* start-up: the best configuration so far (D-PRO-4) */
@@ -51,12 +51,12 @@ typedef struct {
     profile_run_t run;
 } arb_limb_t;
 
-/* flags_on and flags_off override what is stored. tables: the arbitrator's tables; they must outlive
- * limb. Reads the memory: may block for as long as that takes. */
+/* Reads what is stored, which may block for as long as the memory needs. flags_on and flags_off override the
+ * stored flags. tables: the arbitrator's; they must outlive limb. */
 void arb_limb_init(arb_limb_t *limb, const pdcp_tables_t *tables, arb_nvm_t *nvm, uint8_t flags_on,
                    uint8_t flags_off, uint32_t now_ms);
 
-/* An event of the arbitrator; hand all of them in. */
+/* Takes an event of the arbitrator. All of them must be handed in. */
 void arb_limb_on_event(arb_limb_t *limb, const pdcp_arb_t *arb, uint32_t now_ms, const pdcp_event_t *event);
 
 /* Does what is due. True: the arbitrator was given something to do. */
@@ -68,21 +68,21 @@ uint32_t arb_limb_next_ms(const arb_limb_t *limb, const pdcp_arb_t *arb, uint32_
 /* Is a plan or an action under way? 2307h, 2407h and 2410h wait for its end (D-API-6). */
 bool arb_limb_is_busy(const arb_limb_t *limb);
 
-/* Are there devices, and the start-up is still to come? No action of the host may forestall it. */
+/* Are there devices, but the start-up has not begun? No action of the host may come before it. */
 bool arb_limb_is_starting(const arb_limb_t *limb);
 
-/* Begins an action for the host; nothing may be under way. ARB_OK: arb_limb_take_outcome will say how it
- * went. Otherwise an error, and nothing was begun: ARB_ERR_NUMBER, no such configuration; ARB_ERR_VALUE, no
- * such action; ARB_ERR_BUSY, try again. */
+/* Begins an action for the host; nothing may be under way. ARB_OK: arb_limb_take_outcome tells the outcome.
+ * Otherwise nothing was begun. ARB_ERR_NUMBER: there is no such configuration. ARB_ERR_VALUE: there is no
+ * such action. ARB_ERR_BUSY: try again. */
 uint8_t arb_limb_act(arb_limb_t *limb, uint8_t action, uint8_t argument);
 
-/* What the host is told of a status of arb_config (D-API-4). */
+/* The host's error code for a status of arb_config (D-API-4). */
 uint8_t arb_limb_error(arb_config_status_t status);
 
-/* True, once, when the action has ended: error is ARB_OK or an error, result what 2408h says. */
+/* True, once: the action has ended. error: ARB_OK or an error. result: as in 2408h. */
 bool arb_limb_take_outcome(arb_limb_t *limb, uint8_t *error, uint16_t *result);
 
-/* 2404h: bits 0 to 3, stored. */
+/* Sets and stores the flags, bits 0 to 3 (2404h). */
 void arb_limb_set_flags(arb_limb_t *limb, uint32_t now_ms, uint8_t flags);
 
 /* The flags as they are in force, bits 0 to 3. */
@@ -97,10 +97,10 @@ static inline uint8_t arb_limb_state(const arb_limb_t *limb)
     return (uint8_t)profile_run_status(&limb->run);
 }
 
-/* True, once: the active configuration or the stored ones are not what they were (event 4). */
+/* True, once: the active or the stored configurations have changed (event 4). */
 bool arb_limb_take_change(arb_limb_t *limb);
 
-/* The host has written the stored configurations (240Dh). */
+/* Notes that the host has written the stored configurations (240Dh). */
 void arb_limb_on_written(arb_limb_t *limb, pdcp_arb_t *arb);
 
 #endif

@@ -1,6 +1,6 @@
-/* What the arbitrator needs from outside: a controller to send to, a host to write to, memory that keeps. The
- * program that owns an arb_app_t fills one of these; the functions are called from inside arb_app_* only and
- * never block, but for nvm_read. */
+/* What the arbitrator needs from outside: a CAN controller, a host, and non-volatile memory. The program that
+ * owns an arb_app_t fills in one port. Its functions are called from inside arb_app_* only. None blocks
+ * except nvm_read. */
 #ifndef ARB_PORT_H
 #define ARB_PORT_H
 
@@ -19,7 +19,7 @@ typedef enum {
 } arb_port_counter_t;
 
 typedef struct {
-    void *ctx; /* handed to every function; owned by the program, outlives the application */
+    void *ctx; /* passed to every function; belongs to the program and outlives the application */
 
     /* Sends one frame; it is copied. False: no room now. The application keeps the frame and offers it again
      * in the next arb_app_step, which the program calls as soon as there is room. */

@@ -18,8 +18,8 @@
 
 enum {
     PROFILE_PLAN_DEPTH = 64, /* length of the longest chain of required inputs; longer ones fail (D-PRO-17) */
-    PROFILE_PLAN_SHARE = 8   /* a link with all that it requires may use one part in so many of the steps that
-                                are left, so that later ones get theirs */
+    PROFILE_PLAN_SHARE = 8   /* a link and all that it requires may use one eighth of the steps that are left,
+                                so that later links get theirs */
 };
 
 /* Channels that one plan may look at (D-PRO-17). Links that would take more are not made. */
@@ -38,7 +38,7 @@ enum {
  *
  * LOOK finds the links that work, AWAITED the ends that are awaited. Rounds follow. Their parts are ENFORCE,
  * ORIGINALS, REPAIR, SETTLE and AUTO, of which profile_plan.c leaves out those that are not planned.
- * ROUND_END begins another round until nothing changes. FINISH writes to the configuration.
+ * ROUND_END begins another round until nothing changes. WRITE_DOWN writes to the configuration.
  *
  * ORIGINALS looks for a link that can come back. ORIGINALS_TAKE takes away what it replaces, ORIGINALS_LINK
  * links it, and ORIGINALS_JUDGE undoes both if that cost too much.
@@ -149,7 +149,7 @@ typedef struct {
     } below;                                           /* connect's frames below the top */
 
     uint8_t stand_in[PROFILE_LINKS_MAX]; /* of entries: the input that stands in, as planned so far */
-    uint8_t want[PDCP_CHANNELS_MAX];     /* of inputs: the output that they are to hear, as planned so far */
+    uint8_t want[PDCP_CHANNELS_MAX];     /* of inputs: the output that they shall hear, as planned so far */
     uint8_t log[PDCP_CHANNELS_MAX];      /* inputs connected, in order, for undoing */
 } profile_board_t;
 
@@ -179,8 +179,8 @@ void profile_board_look_at_ends(profile_board_t *board);
 /* Does the plan give this input the output that an entry names? */
 bool profile_board_hears_output_of(const profile_board_t *board, uint8_t input, uint8_t entry);
 
-/* Another sole-access input that has the output, if this one is a sole-access input, too; PDCP_NONE: there is
- * none. */
+/* Another sole-access input that has the output, if this one is a sole-access input as well. PDCP_NONE: there
+ * is none. */
 uint8_t profile_board_rival_of(profile_board_t *board, uint8_t input, uint8_t output);
 
 /* Gives an input another source, or takes its source away (PDCP_NONE). The input may be PDCP_NONE. */

@@ -1,4 +1,4 @@
-/* What the bus tables say of a channel, in the words of the profile layer. Nothing is changed here. */
+/* Channels of the bus tables, read in the terms of the profile layer. */
 #ifndef PROFILE_CHANNEL_H
 #define PROFILE_CHANNEL_H
 
@@ -8,16 +8,16 @@
 #include "pdcp_tables.h"
 #include "profile_config.h"
 
-/* Flags of the type of an input. */
+/* Does the type of an input say sole access, or terminal? */
 bool profile_channel_is_sole(const pdcp_channel_t *channel);
 bool profile_channel_is_terminal(const pdcp_channel_t *channel);
 
-/* The profile that a terminal channel is served by, lowest first: its terminal profile, or its own if that is
- * 0 (D-PRO-3). */
+/* The priority of a terminal channel, lowest first: its terminal profile, or its own profile if that is 0
+ * (D-PRO-3). */
 uint16_t profile_channel_priority(const pdcp_channel_t *channel);
 
-/* Is this channel on a device that is set up, and does it have this direction (PDCP_INPUT, PDCP_OUTPUT)? The
- * channel may be PDCP_NONE. */
+/* Does this channel belong to a device that is set up, and have this direction (PDCP_INPUT, PDCP_OUTPUT)?
+ * False for PDCP_NONE. */
 bool profile_channel_is_ready(const pdcp_tables_t *tables, uint8_t channel, uint8_t transfer);
 
 /* The source of an input that is ready and has an active link; PDCP_NONE: there is none. */

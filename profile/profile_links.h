@@ -1,8 +1,8 @@
 /* The active configuration: the links as they should be, whether their ends are there or not.
  *
- * It is what a save stores. An input has one entry at most. Entries are in the order of their inputs: lower
- * profile, then lower VID, PID, SN, index, so that it does not matter in which order they came. Devices that
- * several entries name are kept once (parts). Plain data: no frames, no time passes here. */
+ * A save stores it. An input has one entry at most. Entries are ordered by their inputs: lower profile, then
+ * lower VID, PID, SN, index. So it does not matter in which order they came. A device that several entries
+ * name is kept once (parts). Plain data: nothing here knows frames or time. */
 #ifndef PROFILE_LINKS_H
 #define PROFILE_LINKS_H
 
@@ -42,22 +42,22 @@ typedef struct {
 
 void profile_links_init(profile_links_t *links);
 
-/* Adds a link, in place of the one that its input has; what stands in for that one is remembered, or it would
- * stay for good. False: no room, nothing is changed. */
+/* Adds a link, and replaces the one that its input has. What stands in for that one stays noted; otherwise it
+ * would stand in for good. False: there is no room, and nothing has changed. */
 bool profile_links_put(profile_links_t *links, const profile_link_t *link, bool by_host);
 
 void profile_links_remove(profile_links_t *links, uint8_t entry);
 
-/* Would a link break sole access: has its output an entry with another sole-access input already? */
+/* Would a link break sole access? Its output would have an entry with another sole-access input. */
 bool profile_links_is_claimed(const profile_links_t *links, const profile_link_t *link);
 
-/* Entry of the input with this owner and index; PDCP_NONE: it has none. */
+/* Entry of the input with this owner and index. PDCP_NONE: it has none. */
 uint8_t profile_links_find(const profile_links_t *links, const pdcp_identity_t *owner, uint8_t index);
 
-/* The same for a channel of the tables. */
+/* Entry of an input of the tables. PDCP_NONE: it has none. */
 uint8_t profile_links_of(const profile_links_t *links, const pdcp_tables_t *tables, uint8_t channel);
 
-/* Takes an entry out in full. */
+/* Writes an entry to *link, with the devices of both ends. */
 void profile_links_get(const profile_links_t *links, uint8_t entry, profile_link_t *link);
 
 /* Does an end name this channel of the tables? */

@@ -48,7 +48,7 @@ bool profile_plan_step(profile_board_t *board, const profile_scene_t *scene, int
 /* Has a device come or gone since the plan was begun? Then it must be begun again. */
 bool profile_plan_is_stale(const profile_board_t *board, const profile_scene_t *scene);
 
-/* Do other links work than those that the plan was begun with? */
+/* Do the links that work differ from those when the plan was begun? */
 bool profile_plan_links_differ(const profile_board_t *board, const profile_scene_t *scene);
 
 #endif

@@ -1,9 +1,9 @@
-/* The profile layer at work (profile-layer.md 4): what it knows, and which plan is due.
+/* The profile layer at work: its state, and which plan is due (profile-layer.md 4).
  *
- * It waits for the start-up (profile_start.h), then plans whenever a device is lost or has been set up, or a
- * link that worked does not any more. What happens on the bus comes in by profile_events.h. profile_step.h
- * makes the plan that is due and lets profile_carry.h carry it out. profile_active.h keeps the active
- * configuration; what the layer knows of stored configurations its owner tells it.
+ * It waits for the start-up (profile_start.h). Then it plans whenever a device is lost or set up, or a link
+ * stops working. profile_events.h takes what happens on the bus. profile_step.h makes the plan that is due
+ * and lets profile_carry.h carry it out. profile_active.h keeps the active configuration. Of stored
+ * configurations the layer knows only what its owner tells it.
  *
  * A link that cannot be made is banned, and the plan is made again without it and without what was made for
  * it (D-PRO-5). If the tables change before a plan is made, it is begun again (D-PRO-23).
@@ -29,11 +29,11 @@
 #include "profile_plan.h"
 
 enum {
-    PROFILE_QUIET_MS = 500,   /* the start-up waits until nothing was bound or set up for so long */
-    PROFILE_ARRIVAL_MS = 500, /* the plan for a new device waits so long for others that are being set up */
-    PROFILE_RESET_MS = 3000,  /* a device that the host has reset may be away so long (profile-layer.md 4) */
+    PROFILE_QUIET_MS = 500,   /* quiet time before the start-up: nothing binds or is set up */
+    PROFILE_ARRIVAL_MS = 500, /* longest wait of a plan for devices that are being set up */
+    PROFILE_RESET_MS = 3000,  /* how long a reset device may be away (profile-layer.md 4.5) */
     PROFILE_TRIES_MAX = 3,    /* tries of a link whose device does not answer, before the next candidate */
-    PROFILE_RETRY_MS = 5000   /* links that could not be made are tried again after so long */
+    PROFILE_RETRY_MS = 5000   /* until links that could not be made are tried again */
 };
 
 /* Profile state of 2401h. */
@@ -78,9 +78,9 @@ typedef struct {
     bool changed;        /* the configuration has changed; the owner resets it */
     uint16_t moves;      /* links made or taken away by this plan */
     uint32_t stirred_ms; /* when a setup ended last */
-    uint32_t arrival_ms; /* the plan that is due waits so long at most, unless it is urgent */
-    uint32_t awaited_ms; /* until when reset devices are awaited; means something while awaited has bits */
-    uint32_t retry_ms;   /* when banned links are tried again; means something while there are some */
+    uint32_t arrival_ms; /* until when the plan that is due waits at most, with PROFILE_AFTER_SETUPS */
+    uint32_t awaited_ms; /* until when reset devices are awaited; valid while awaited has bits */
+    uint32_t retry_ms;   /* when banned links are tried again; valid while there are some */
     profile_board_t plan;
     profile_links_t links; /* the active configuration */
 } profile_run_t;
@@ -100,8 +100,8 @@ static inline profile_state_t profile_run_status(const profile_run_t *run)
 /* Is a plan due or under way? */
 bool profile_run_is_busy(const profile_run_t *run);
 
-/* Begins a plan, profile_plan_what_t bits. It starts from the links that work; with `anew` only from those
- * that the host has made, so that others that are not in the configuration go. */
+/* Begins a plan (profile_plan_what_t bits). It starts from the links that work or, with `anew`, only from
+ * those that the host has made: then others that are not in the configuration go. */
 void profile_run_begin(profile_run_t *run, uint8_t what, bool anew);
 
 /* For the other files of the layer ----------------------------------------------------------------------- */

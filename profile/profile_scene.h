@@ -1,6 +1,6 @@
-/* What a plan is made from: the bus tables, the active configuration, and what the planner must leave out.
+/* What a plan is made from: bus tables, active configuration, and what the planner must leave out.
  *
- * The owner (profile_run.h) fills it in. The planner only reads it, until the plan is done: then it changes
+ * The owner (profile_run.h) fills it in. The planner only reads it, except that a plan that is made changes
  * entries of the configuration. */
 #ifndef PROFILE_SCENE_H
 #define PROFILE_SCENE_H
@@ -37,7 +37,7 @@ typedef struct {
 /* Is the device of an end only away for a moment: awaited, or being set up at this time (D-PRO-13)? */
 bool profile_scene_is_awaited(const profile_scene_t *scene, const profile_ref_t *end);
 
-/* Must the plan leave this pair out? */
+/* Is this pair banned, so that the plan must leave it out? */
 bool profile_scene_is_banned(const profile_scene_t *scene, uint8_t output, uint8_t input);
 
 /* The source of an input whose link works and counts; PDCP_NONE: there is none. */

@@ -8,18 +8,18 @@
 #include "pdcp_arb.h"
 #include "profile_run.h"
 
-/* Goes back to waiting for the start-up, since the arbitrator has started again. Empties the configuration
- * unless it is frozen. The rest of what a plan is made from is set when one is begun. */
+/* Waits for the start-up again: the arbitrator has started afresh. Empties the configuration unless it is
+ * frozen. */
 void profile_start_wait(profile_run_t *run, uint32_t now_ms);
 
-/* Is a device set up, and has the start-up not begun yet? */
+/* Is a device set up, but the start-up has not begun? */
 bool profile_start_is_pending(const profile_run_t *run);
 
-/* When the bus will have been quiet for PROFILE_QUIET_MS, or was. The time by which a grant was held is taken
- * off (D-BUS-34). */
+/* The time from which the bus has been quiet for PROFILE_QUIET_MS. The time for which grants were held is
+ * taken off (D-BUS-34). */
 uint32_t profile_start_ms(const profile_run_t *run, const pdcp_arb_t *arb);
 
-/* May the start-up begin? It must be pending, with no link half made and the bus quiet for long enough. */
+/* May the start-up begin? It must be pending, no link half made, and the bus quiet for long enough. */
 bool profile_start_may_begin(const profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms);
 
 /* Begins the start-up. stored: a stored configuration has been loaded. Otherwise the configuration is read

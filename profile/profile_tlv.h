@@ -1,5 +1,6 @@
-/* The byte string that stored configurations are (profile-layer.md 5) [PROFILE 4.5]: entries of 3 bytes, a
- * code and a 16-bit value, least significant byte first (D-PRO-7). In the order of [PROFILE figure 4.10]:
+/* Stored configurations as a byte string (profile-layer.md 5) [PROFILE 4.5]. It consists of entries of 3
+ * bytes: a code and a 16-bit value, least significant byte first (D-PRO-7). In the order of [PROFILE figure
+ * 4.10]:
  *
  *   1 count                                       number of configurations
  *   2 number, 3 count                             a configuration, how many links it has
@@ -48,8 +49,8 @@ enum {
 
 /* Reader ------------------------------------------------------------------------------------------------- */
 
-/* Told of a link of configuration number when it is complete; the string may still turn out to be bad. The
- * link belongs to the reader and lasts for the call. Must not call back into the reader. */
+/* Takes a complete link of configuration `number`. The string may still turn out to be bad. The link belongs
+ * to the reader and is valid during the call. Must not call the reader. */
 typedef void (*profile_tlv_on_link_t)(void *ctx, uint8_t number, const profile_link_t *link);
 
 typedef enum {
@@ -58,11 +59,11 @@ typedef enum {
     PROFILE_TLV_ERR_COUNT = -1, /* a count that does not match */
     PROFILE_TLV_ERR_TWICE = -2, /* an index, a count, a link's input or output given twice */
     PROFILE_TLV_ERR_RANGE = -3, /* configuration 0, or an index above 255 */
-    PROFILE_TLV_ERR_PLACE = -4  /* an entry outside what it belongs to: a link outside a configuration, ... */
+    PROFILE_TLV_ERR_PLACE = -4  /* an entry in a wrong place, such as a link outside a configuration */
 } profile_tlv_status_t;
 
-/* Reads a string of any length, byte by byte (D-PRO-20). It skips codes that it does not know, takes missing
- * values as 0 and input and output of a link in either order. Only numbers and names are not private. */
+/* Reads a string of any length, byte by byte (D-PRO-20). Skips unknown codes, takes missing values as 0, and
+ * accepts input and output of a link in either order. Users read numbers and names only. */
 typedef struct {
     profile_tlv_on_link_t on_link; /* NULL: nobody is told */
     void *ctx;
@@ -84,18 +85,17 @@ typedef struct {
 /* on_link: NULL, nobody is told. */
 void profile_tlv_init(profile_tlv_t *reader, profile_tlv_on_link_t on_link, void *ctx);
 
-/* Takes the next bytes; after an error or the end they are ignored. Returns how it stands. */
+/* Takes the next bytes, which are ignored after an error or the end. Returns the status so far. */
 profile_tlv_status_t profile_tlv_read(profile_tlv_t *reader, const uint8_t *bytes, uint16_t len);
 
-/* Whether a number is in a set, a bit for each. */
+/* Is a number in the set? */
 static inline bool profile_tlv_has(const uint8_t set[PROFILE_TLV_SET_BYTES], uint8_t number)
 {
     return pdcp_bit(set, number);
 }
 
-/* Does a link name this device? Now and then it is said of one that no link names: of one in eight when
- * sixteen are
- * named. */
+/* Does a link name this device? This may be true of a device that no link names: of one in eight when sixteen
+ * are named. */
 bool profile_tlv_names(const uint8_t names[PROFILE_TLV_NAMES_BYTES], const pdcp_identity_t *identity);
 
 /* Writer ------------------------------------------------------------------------------------------------- */

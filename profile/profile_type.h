@@ -48,17 +48,17 @@ typedef struct {
 #define PROFILE_TYPE_SOLE PDCP_TYPE_SOLE
 #define PROFILE_TYPE_TERMINAL 0x0100u
 
-/* Takes a type word apart. False: a float that has not 16 bits (D-PRO-2); type is filled all the same. Unused
- * bits are ignored. */
+/* Decodes a type word. Unused bits are ignored. False: a float that does not have 16 bits (D-PRO-2); type is
+ * filled all the same. */
 bool profile_type_decode(uint16_t word, profile_type_t *type);
 
-/* The word of a type; unused bits are 0. Members beyond their field are cut to it. */
+/* Encodes a type; unused bits are 0. Members that are too large are cut to their fields. */
 uint16_t profile_type_encode(const profile_type_t *type);
 
 /* Bytes of one value: 1 for 4 and 8 bits, 2 for 12 and 16. */
 uint8_t profile_type_bytes(const profile_type_t *type);
 
-/* Smallest and largest value. False: float, which has no such range; nothing is written. Boolean: 0 and 1. */
+/* Gets the smallest and the largest value; of a boolean 0 and 1. False: a float, and nothing is written. */
 bool profile_type_range(const profile_type_t *type, int32_t *min, int32_t *max);
 
 /* Writes one value, least significant byte first, unused upper bits 0. value is clamped to the range; a

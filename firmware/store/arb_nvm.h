@@ -1,5 +1,5 @@
-/* One memory, several users: identities, flags, configurations. Whoever writes, or reads while a limb moves,
- * owns the memory until it is through, so that nobody takes another one's write for its own.
+/* One memory with several users: identities, flags, configurations. Whoever writes, or reads while a limb
+ * moves, owns the memory until it is done, so that nobody takes another user's write for its own.
  *
  *   address      what                                                    by
  *   0            identities, two areas                                   arb_store.h
@@ -17,7 +17,7 @@
 enum {
     ARB_NVM_FLAGS_AT = 1024,
     ARB_NVM_CONFIG_AT = 2048,
-    ARB_NVM_POLL_MS = 5 /* a page of an EEPROM takes so long */
+    ARB_NVM_POLL_MS = 5 /* time that an EEPROM needs for a page */
 };
 
 typedef enum { ARB_NVM_NOBODY = 0, ARB_NVM_STORE = 1, ARB_NVM_FLAGS = 2, ARB_NVM_CONFIG = 3 } arb_nvm_user_t;
@@ -33,8 +33,8 @@ static inline void arb_nvm_init(arb_nvm_t *nvm, const arb_port_t *port)
     nvm->owner = ARB_NVM_NOBODY;
 }
 
-/* Makes the memory the user's, if it is not another one's. True: it is the user's now. A write of the owner
- * before may still be under way; how it ends concerns nobody. */
+/* Takes the memory for a user. True: the user owns it now. False: it belongs to another. A write of the
+ * previous owner may still be under way; its outcome does not matter any more. */
 static inline bool arb_nvm_take(arb_nvm_t *nvm, arb_nvm_user_t user)
 {
     if (nvm->owner != ARB_NVM_NOBODY && nvm->owner != (uint8_t)user) {
@@ -44,12 +44,12 @@ static inline bool arb_nvm_take(arb_nvm_t *nvm, arb_nvm_user_t user)
     return true;
 }
 
-/* When *due_ms has come, takes the memory for the user and tells how it stands: above 0 it is another one's
- * or a write is under way, 0 it is ready, below 0 it is, too, but the write before has failed. Above 0 also
- * before that time, which is put off to the next poll otherwise. */
+/* Takes the memory for the user from *due_ms on, and returns its state. Above 0: it belongs to another, a
+ * write is under way, or *due_ms has not come. 0: it is ready. Below 0: it is ready, and the last write has
+ * failed. At or after *due_ms that becomes the time of the next poll. */
 int8_t arb_nvm_poll(arb_nvm_t *nvm, arb_nvm_user_t user, uint32_t *due_ms, uint32_t now_ms);
 
-/* The user does not need it any longer. Does nothing if it is not the user's. */
+/* Gives the memory back. Does nothing if it is not the user's. */
 void arb_nvm_give(arb_nvm_t *nvm, arb_nvm_user_t user);
 
 /* nvm_read and nvm_write of the port. */

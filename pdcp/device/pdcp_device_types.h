@@ -1,8 +1,8 @@
-/* What a device of the device role is made of: its description, which the application fills, its state, and
- * the readers of that state. pdcp_device.h says what is done with them.
+/* Types of the device role: the description that the application fills, the state, and its readers. The
+ * functions are in pdcp_device.h.
  *
- * Descriptions are constant and the caller's. A pdcp_device_t is the caller's memory and belongs to the
- * device role from pdcp_device_init on. */
+ * Descriptions are constant and belong to the caller. A pdcp_device_t is the caller's memory; from
+ * pdcp_device_init on, only the device role writes to it. */
 #ifndef PDCP_DEVICE_TYPES_H
 #define PDCP_DEVICE_TYPES_H
 
@@ -14,7 +14,7 @@
 #include "pdcp_spec.h"
 #include "pdcp_txq.h"
 
-/* Bytes that stand in flash or elsewhere. They belong to the caller and outlive the device. */
+/* Bytes in flash or elsewhere. They belong to the caller and outlive the device. */
 typedef struct {
     const void *bytes; /* may be NULL when len is 0 */
     uint16_t len;
@@ -33,8 +33,8 @@ typedef struct {
     pdcp_device_bytes_t desired;
 } pdcp_device_channel_desc_t;
 
-/* A parameter of the application's own: a gain, a threshold, a name that can be changed. It is looked up
- * before those of the specification, so that it may take the place of one, such as a writable descriptor. */
+/* A parameter of the application, such as a gain, a threshold or a name. It is looked up before those of the
+ * specification and may replace one, such as the descriptor by a writable one. */
 typedef struct {
     uint8_t param;
     uint8_t channel; /* 0: the device */
@@ -83,17 +83,17 @@ static inline bool pdcp_device_source_connected(const pdcp_device_source_t *sour
            source->identity.sn != PDCP_NO_SOURCE_WORD || source->channel != PDCP_NO_SOURCE_INDEX;
 }
 
-/* What must outlive power-off [PROFILE 4.3.2]. Fixed size; how and where it is kept, and how damage is
- * noticed, is the application's business. */
+/* What must outlive power-off [PROFILE 4.3.2], of fixed size. The application decides where it is kept, and
+ * how damage is noticed. */
 typedef struct {
     uint8_t node_id; /* last id, 0: none yet */
     pdcp_device_source_t
         sources[PDCP_DEVICE_CHANNELS_MAX]; /* by channel index - 1; those of outputs are not used */
 } pdcp_device_record_t;
 
-/* What the device needs from its application. Every function may be NULL. They run inside
- * pdcp_device_on_frame or pdcp_device_step and may call pdcp_device_send and the readers below, nothing else
- * of this header. */
+/* Functions that the device calls. Each may be NULL. They run inside pdcp_device_on_frame or
+ * pdcp_device_step. They may call pdcp_device_send and the readers below, and nothing else of the device
+ * role. */
 typedef struct {
     void *ctx;
     /* Channel data for an enabled input. data is valid during the call, len is 0 to 8. */
@@ -101,7 +101,7 @@ typedef struct {
     /* A terminal input must go to its safe value now: the arbitrator is gone, transfer was disabled, or the
      * device was reset. It stays there until data comes. */
     void (*safe)(void *ctx, uint8_t channel);
-    /* The record has changed and is to be kept. Comes several times in a row while a link is made: an
+    /* The record has changed and must be kept. This comes several times in a row while a link is made; an
      * application whose memory wears may wait for the last. record is valid during the call. */
     void (*store)(void *ctx, const pdcp_device_record_t *record);
     /* Reset Device came. The answer is queued and the device is unbound already; an application that restarts
@@ -175,11 +175,11 @@ typedef struct {
     uint16_t size;
     uint16_t done; /* bytes acknowledged or received */
     const uint8_t *bytes;
-    uint8_t small[PDCP_VALUE_MAX]; /* a value that does not stand anywhere as bytes */
+    uint8_t small[PDCP_VALUE_MAX]; /* a value that stands nowhere else as bytes */
     uint32_t deadline_ms;
 } pdcp_device_bulk_t;
 
-/* The device. Its members are read through the functions below it; nobody but pdcp_device*.c writes them. */
+/* The device. Read its members through the functions below; only pdcp_device*.c writes them. */
 typedef struct {
     const pdcp_device_desc_t *desc;
     const pdcp_device_port_t *port;

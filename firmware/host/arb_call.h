@@ -1,14 +1,13 @@
-/* What the files of the host API share: a request being served, and what a handler of a message gets and
- * says. Only arb_hostapi.c (queue, answers), arb_hostbus.c (2201h to 230Dh) and arb_hostext.c (24xxh) use
- * this. */
+/* A request of the host being served, as its handler sees it. Only arb_hostapi.c (queue, answers),
+ * arb_hostbus.c (2201h to 230Dh) and arb_hostext.c (24xxh) use this. */
 #ifndef ARB_CALL_H
 #define ARB_CALL_H
 
 #include "arb_error.h"
 #include "arb_hoststate.h"
 
-/* What a handler says: an error code; ARB_OK, with a success payload of answer_len bytes; or that somebody
- * else has to speak first: it is called again with every step until it says something else. */
+/* A handler returns an error code, or ARB_OK with a success payload of answer_len bytes, or ARB_PENDING: then
+ * it is called again in every step. */
 enum { ARB_PENDING = 0xFF };
 
 enum { ARB_RESET_RESULTS = 8 }; /* bytes: the payload of 230Fh */
@@ -20,14 +19,14 @@ typedef struct {
     uint32_t now_ms;
     uint8_t *payload; /* of the request; stays where it is until the request is answered */
     uint16_t len;
-    uint8_t place[2]; /* of the devices that the payload names */
+    uint8_t place[2]; /* places of the devices that the payload names */
     uint8_t *answer;  /* payload of the success answer, ARB_HOST_ANSWER_MAX bytes; stays where it is too */
     uint16_t answer_len;
 } arb_call_t;
 
 typedef uint8_t (*arb_handler_t)(arb_call_t *call);
 
-/* What is made sure of before the handler is called first. */
+/* A message, and what is checked before its handler is called. */
 typedef struct {
     uint16_t id;
     unsigned len : 8;     /* of the payload; another one: ARB_ERR_SIZE */
@@ -37,31 +36,30 @@ typedef struct {
     arb_handler_t handler;
 } arb_message_t;
 
-/* Something was given to the arbitrator, whose end the handler waits for. */
+/* Notes that the arbitrator was given something whose end the handler waits for. Returns ARB_PENDING. */
 uint8_t arb_call_started(arb_call_t *call);
 
-/* Waits until limit_ms after the first call for this request, when the handler is called at the latest.
- * False: that time is over. */
+/* Waits, limit_ms at most from the first call for this request. False: that time is over. */
 bool arb_call_wait(arb_call_t *call, uint16_t limit_ms);
 
 /* Waits for a running setup or planner, 2 s at most (D-API-6): ARB_PENDING, or ARB_ERR_NOT_READY. */
 uint8_t arb_call_wait_ready(arb_call_t *call);
 
-/* What the bus says about a request that was begun, with the value that came as the answer; ARB_PENDING until
- * then. ARB_HOST_ANSWER_MS after its first call it is given up (D-API-16). */
+/* The outcome of a request that was begun on the bus, with the value that came as the answer; ARB_PENDING
+ * until then. The request is given up ARB_HOST_ANSWER_MS after its first call (D-API-16). */
 uint8_t arb_call_outcome(arb_call_t *call);
 
-/* Place of the device that six bytes of a request name; PDCP_NONE: it is not on the bus. */
+/* Place of the device that six bytes of a request name. PDCP_NONE: it is not on the bus. */
 uint8_t arb_call_device(const arb_call_t *call, const uint8_t *bytes);
 
-/* Channel number of the channel that the payload names at this end, whose device was found; PDCP_NONE: the
- * device has no such channel of this direction, or is not set up. */
+/* Number of the channel that the payload names at this end; its device was found. PDCP_NONE: the device has
+ * no such channel of this direction, or is not set up. */
 uint8_t arb_call_channel(const arb_call_t *call, uint8_t end, uint8_t transfer);
 
 /* The error code for a pdcp_status_t. */
 uint8_t arb_call_error(int8_t status);
 
-/* The bus has spoken: what the request at the front waits for may have come. */
+/* Takes an event: what the request at the front waits for may have come. */
 void arb_hostbus_on_event(arb_hostapi_t *api, const pdcp_event_t *event);
 
 /* The handlers, by the names of their messages. */

@@ -1,9 +1,8 @@
-/* The host API (host-api.md): takes the host's bytes, holds up to four requests, serves them in order, one
- * answer each.
+/* The host API: takes the host's bytes, holds up to four requests, and answers them in order (host-api.md).
  *
- * A fifth request is answered with error 07h at once, the only answer out of order (D-API-3). What is
- * answered from the tables is answered in the same call; what needs the bus stays at the front until the bus
- * has spoken. Events (arb_hostevents.h) are sent when no answer waits.
+ * A fifth request is answered with error 07h at once, the only answer out of order (D-API-3). Requests about
+ * the tables are answered in the same call; requests to the bus stay at the front until the bus has answered.
+ * Events (arb_hostevents.h) are sent when no answer waits.
  *
  * How long an answer waits behind events that were handed over already is up to the port: host_write should
  * take no more than the line carries within some 20 ms. */
@@ -15,31 +14,30 @@
 
 #include "arb_hoststate.h"
 
-/* Bytes from the host. Returns how many were taken; the rest is to be offered again after the next step: the
- * host does not read its answers. */
+/* Takes bytes from the host. Returns how many were taken. If the host does not read its answers, some are
+ * left: offer them again after the next step. */
 uint16_t arb_hostapi_on_bytes(arb_hostapi_t *api, uint32_t now_ms, const uint8_t *bytes, uint16_t len);
 
-/* An event of the arbitrator. */
+/* Takes an event of the arbitrator. */
 void arb_hostapi_on_event(arb_hostapi_t *api, const pdcp_arb_t *arb, uint32_t now_ms,
                           const pdcp_event_t *event);
 
-/* Does the host want CAN frames? Asked for every frame. */
+/* Does the host want CAN frames? Called for every frame. */
 static inline bool arb_hostapi_wants_frames(const arb_hostapi_t *api)
 {
     return arb_hostevents_wants(&api->events, ARB_EVENT_FRAME);
 }
 
-/* A frame on the bus, received or sent, for a host that wants them: handed over at once if the host has
- * room. */
+/* Takes a frame on the bus, received or sent, for a host that wants them. It is handed over at once if the
+ * host has room. */
 void arb_hostapi_on_frame(arb_hostapi_t *api, const arb_port_t *port, uint32_t now_ms,
                           const can_frame_t *frame);
 
-/* The host has closed its end: the event stream ends, and so does what it has begun to send. Requests that it
- * has sent are served to their end, but for those that would begin a stream (D-API-17). */
+/* Ends the session of a host that has closed its end: the event stream and a half-sent message. Its whole
+ * requests are served, except those that would begin a stream (D-API-17). */
 void arb_hostapi_on_host_gone(arb_hostapi_t *api);
 
-/* Serves what can be served and sends what can be sent. Returns true when the arbitrator was given something
- * to do. */
+/* Serves and sends what it can. True: the arbitrator was given something to do. */
 bool arb_hostapi_step(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms);
 
 /* Do answers wait for room at the host? */
@@ -48,7 +46,7 @@ static inline bool arb_hostapi_has_answer(const arb_hostapi_t *api)
     return (api->answer_out.len | api->urgent_out.len) != 0;
 }
 
-/* Do answers or events? */
+/* Do answers or events wait for room at the host? */
 static inline bool arb_hostapi_has_output(const arb_hostapi_t *api)
 {
     return arb_hostapi_has_answer(api) || arb_hostevents_wait(&api->events);

@@ -1,5 +1,5 @@
-/* Wire layout of the host API [API 3.1]: header, checksums, and the fields that messages are made of beside
- * those of pdcp_bytes.h.
+/* Wire layout of the host API [API 3.1]: header, checksums and fields of messages. pdcp_bytes.h has the
+ * numbers and identities.
  *
  *   byte     0    1    2       3       4    5     6         7         8 ...    last two
  *            FEh  19h  id LSB  id MSB  ref  CRC8  size LSB  size MSB  payload  CRC16 LSB, MSB
@@ -20,7 +20,7 @@ enum {
     ARB_HOST_CRC = 2     /* bytes */
 };
 
-/* Fields that messages are made of. */
+/* Sizes of fields. */
 enum {
     ARB_CHANNEL_BYTES = 7,                      /* identity of the device, channel index */
     ARB_LINK_BYTES = 2 * ARB_CHANNEL_BYTES + 1, /* output, input, status */
@@ -64,27 +64,27 @@ enum {
     ARB_MSG_EVENT = 0x2419 /* from the arbitrator, unasked */
 };
 
-/* A message on its way to the host. */
+/* A message that is being sent to the host. */
 typedef struct {
     uint16_t len; /* of the whole message; 0: there is none */
     uint16_t sent;
 } arb_out_t;
 
-/* Polynomial 07h, initial 00h, not reflected; over header bytes 2, 3, 4, 6, 7 (D-API-1). */
+/* CRC8: polynomial 07h, initial 00h, not reflected; over header bytes 2, 3, 4, 6, 7 (D-API-1). */
 uint8_t arb_hostcodec_crc8(const uint8_t header[ARB_HOST_HEADER]);
 
-/* Polynomial 1021h, initial FFFFh, not reflected; over the payload (D-API-1). */
+/* CRC16: polynomial 1021h, initial FFFFh, not reflected; over the payload (D-API-1). */
 uint16_t arb_hostcodec_crc16(const uint8_t *payload, uint16_t len);
 
 /* Completes a message whose payload of len bytes stands at frame + ARB_HOST_HEADER: writes header and CRC16.
  * Returns the length of the whole message. frame[] needs room for header, payload and CRC16. */
 uint16_t arb_hostcodec_finish(uint8_t *frame, uint16_t id, uint8_t reference, uint16_t len);
 
-/* A channel as messages name it: the identity of its device, its index. */
+/* Writes a channel as messages name it: the identity of its device, then its index. */
 void arb_hostcodec_put_channel(uint8_t bytes[ARB_CHANNEL_BYTES], const pdcp_identity_t *identity,
                                uint8_t index);
 
-/* The link of an input as 220Eh and its event tell of it: output, input, status. */
+/* Writes the link of an input as in 220Eh and in its event: output, input, status. */
 void arb_hostcodec_put_link(uint8_t bytes[ARB_LINK_BYTES], const pdcp_tables_t *tables,
                             const pdcp_channel_t *input);
 

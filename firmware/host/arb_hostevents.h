@@ -1,10 +1,10 @@
-/* The event stream to the host (2416h and 2419h, host-api.md 3): what happens on the bus, as messages that
- * nobody asked for. Nothing is sent to a host that has not asked for the stream.
+/* The event stream to the host: messages about what happens on the bus (2416h and 2419h, host-api.md 3). Only
+ * a host that has asked for it gets it.
  *
- * Events wait in a queue; one that finds no room is dropped and counted by its kind. CAN frames get no more
- * than a part of the queue, so that at full bus load the other kinds still find room. The answers to requests
- * go first: arb_hostapi.c takes a message from here only when no answer waits, so that an answer never waits
- * for more than the rest of one message, 30 bytes. */
+ * Events wait in a queue. One that finds no room is dropped and counted by its kind. CAN frames may take only
+ * a part of the queue, so that the other kinds find room at full bus load. Answers go first: arb_hostapi.c
+ * takes a message from here only when no answer waits. So an answer waits for the rest of one message at
+ * most, 30 bytes. */
 #ifndef ARB_HOSTEVENTS_H
 #define ARB_HOSTEVENTS_H
 
@@ -52,27 +52,27 @@ static inline bool arb_hostevents_wants(const arb_hostevents_t *events, arb_even
     return (events->mask & (1u << (kind - 1))) != 0;
 }
 
-/* From now on these kinds; events of others that still wait are never sent. */
+/* Sets the wanted kinds. Waiting events of other kinds are dropped. */
 void arb_hostevents_set_mask(arb_hostevents_t *events, uint16_t mask);
 
-/* The host is gone: whoever comes next has not asked for anything (D-API-14). */
+/* Ends the stream: the host is gone, and the next one has not asked for anything (D-API-14). */
 void arb_hostevents_end(arb_hostevents_t *events);
 
-/* An event of the arbitrator; those that are of no kind, or of one that is not wanted, are ignored. */
+/* Takes an event of the arbitrator. Ignored if it has no kind, or one that is not wanted. */
 void arb_hostevents_on_event(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms,
                              const pdcp_event_t *event);
 
-/* A frame on the bus, received or sent. Only base frames are events (D-API-14). */
+/* Takes a frame on the bus, received or sent. Only base frames are events (D-API-14). */
 void arb_hostevents_on_frame(arb_hostevents_t *events, uint32_t now_ms, const can_frame_t *frame);
 
-/* Another active configuration, or another number of stored ones. */
+/* Notes that the active configuration or the number of stored ones has changed. */
 void arb_hostevents_on_config(arb_hostevents_t *events, uint32_t now_ms, uint8_t active, uint8_t stored);
 
-/* Makes the oldest event the message being sent, if none is. True: message[] holds one, and out says what of
- * it is still to be sent. */
+/* Makes the oldest event the message to be sent, if there is none. True: message[] holds one, and out says
+ * how much of it is left. */
 bool arb_hostevents_next(arb_hostevents_t *events);
 
-/* Is something to be sent? */
+/* Is there something to send? */
 static inline bool arb_hostevents_wait(const arb_hostevents_t *events)
 {
     return events->out.len != 0 || events->used != 0;

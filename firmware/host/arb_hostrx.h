@@ -1,10 +1,9 @@
-/* Finds requests in the host's byte stream (D-API-2). Whatever the checksums, messages are handed on
- * (D-API-1: lenient), but one with a wrong checksum that has a header with a right one inside is taken for a
- * truncated message with another behind it (D-API-8).
+/* Finds requests in the host's byte stream (D-API-2).
  *
- * Hunts for FE 19; whatever turns out to be no message is given up from its first byte on, and the bytes
- * behind it are looked at again: a correct request right behind garbage, or swallowed by a truncated one, is
- * found. */
+ * It hunts for FE 19. If that turns out not to begin a message, the hunt continues at the next byte. So it
+ * finds a correct request right behind garbage, or inside a truncated one. Messages are handed on whatever
+ * their checksums (D-API-1: lenient). One exception: a message with a wrong checksum that contains a header
+ * with a right one is taken for a truncated message with another behind it (D-API-8). */
 #ifndef ARB_HOSTRX_H
 #define ARB_HOSTRX_H
 
@@ -18,7 +17,7 @@
 /* Silence inside a message after which it is given up (D-API-2). */
 #define ARB_HOSTRX_TIMEOUT_MS 100
 
-/* What is counted, since the start; in the order of 2413h (arb_hostext.h). */
+/* Counters since the start, in the order of 2413h (arb_hostext.h). */
 typedef enum {
     ARB_HOSTRX_GARBAGE,    /* bytes skipped */
     ARB_HOSTRX_BAD_SIZES,  /* headers with an impossible size */
@@ -31,7 +30,7 @@ typedef enum {
 /* All 0 at first; it has no init of its own. */
 typedef struct {
     uint16_t len;
-    bool overdue;     /* 100 ms without a byte: what is doubtful is decided now */
+    bool overdue;     /* 100 ms without a byte: decide now what is doubtful */
     uint16_t taken;   /* bytes of the request handed out last; they go with the next call */
     uint32_t last_ms; /* of the last byte */
     uint32_t counters[ARB_HOSTRX_COUNTERS];
@@ -53,14 +52,13 @@ void arb_hostrx_put(arb_hostrx_t *rx, uint32_t now_ms, uint8_t byte);
 /* Gives up a message that has been silent for too long. Then call arb_hostrx_next until it returns false. */
 void arb_hostrx_on_time(arb_hostrx_t *rx, uint32_t now_ms);
 
-/* True: a request has been received; it is taken out. */
+/* Takes the next request out. False: there is none. */
 bool arb_hostrx_next(arb_hostrx_t *rx, arb_hostrx_request_t *request);
 
-/* Forgets what is not a whole message yet; it counts as garbage. */
+/* Forgets an incomplete message, which counts as garbage. */
 void arb_hostrx_clear(arb_hostrx_t *rx);
 
-/* Is a message under way, so that arb_hostrx_on_time is to be called at rx->last_ms +
- * ARB_HOSTRX_TIMEOUT_MS? */
+/* Is a message incomplete? Then call arb_hostrx_on_time at rx->last_ms + ARB_HOSTRX_TIMEOUT_MS. */
 static inline bool arb_hostrx_is_inside(const arb_hostrx_t *rx)
 {
     return rx->len != 0;

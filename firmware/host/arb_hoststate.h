@@ -1,5 +1,5 @@
-/* The state of the host API, and what it speaks to. Its files work on it together: arb_hostapi.c owns queue
- * and answers, arb_hostbus.c and arb_hostext.c serve the request at the front through arb_call.h. */
+/* State of the host API, shared by its files. arb_hostapi.c owns queue and answers; arb_hostbus.c and
+ * arb_hostext.c serve the request at the front through arb_call.h. */
 #ifndef ARB_HOSTSTATE_H
 #define ARB_HOSTSTATE_H
 
@@ -18,11 +18,11 @@
 #include "pdcp_bits.h"
 
 enum {
-    ARB_HOST_NOT_READY_MS = 2000, /* a running setup is waited for so long (D-API-6) */
+    ARB_HOST_NOT_READY_MS = 2000, /* longest wait for a running setup (D-API-6) */
     ARB_HOST_ANSWER_MS = 3000     /* every request has its answer within this time (D-API-3) */
 };
 
-/* What the API speaks to. */
+/* What the API uses. */
 typedef struct {
     const arb_port_t *port; /* takes the bytes for the host, and knows what drivers have counted */
     pdcp_arb_t *arb;
@@ -31,22 +31,22 @@ typedef struct {
     const arb_store_t *store;
 } arb_hostenv_t;
 
-/* How far the request at the front has come, when it cannot be answered at once. */
+/* Progress of the request at the front that cannot be answered at once. */
 typedef struct {
     bool waiting;    /* the handler was called first at since_ms; it is called again by until_ms */
     bool started;    /* the bus works on it */
-    bool ended;      /* the bus has spoken: status, value_len */
+    bool ended;      /* the bus has answered: status, value_len */
     int8_t status;   /* pdcp_status_t */
     uint8_t channel; /* 2410h: number of the input */
     uint8_t open;    /* 230Dh: devices whose reset has not ended */
     uint16_t value_len;
     uint32_t since_ms;
     uint32_t until_ms;
-    uint8_t asked[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)]; /* 230Dh: places of the devices that are to be reset */
+    uint8_t asked[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)]; /* 230Dh: places of the devices to be reset */
     uint8_t reset[PDCP_BIT_BYTES(PDCP_DEVICES_MAX)]; /* and that were */
 } arb_turn_t;
 
-/* What is counted, since the start. */
+/* Counters since the start. */
 typedef enum {
     ARB_HOSTAPI_RECEIVED, /* bytes */
     ARB_HOSTAPI_SENT,     /* bytes */
@@ -64,7 +64,7 @@ typedef struct {
     uint16_t held_used; /* bytes of held_bytes */
     bool strict;        /* checksums are enforced (D-API-1) */
     bool handed;        /* in this step the arbitrator was given something to do */
-    bool blocked;       /* the host had no room for all when it was offered something last */
+    bool blocked;       /* the host did not take all that it was offered last */
     arb_out_t answer_out;
     arb_out_t urgent_out;
     uint32_t counters[ARB_HOSTAPI_COUNTERS];

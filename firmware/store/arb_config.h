@@ -11,10 +11,10 @@
  * by bytes 0 to 7. A memory that holds nothing good reads as a string without configurations (1 0, 15 0), so
  * that whatever is read can be written back (D-API-15).
  *
- * One job at a time: it is started by a function below and carried on by arb_config_step in small steps (one
- * page written or ARB_CONFIG_READ_MAX bytes read), the last of which tells how it ended. What is already
- * stored is not written. What is written is read back and checked before its header makes it the newest
- * copy (D-PRO-21). */
+ * There is one job at a time. A function below starts it, and arb_config_step carries it on in small steps:
+ * one page written, or ARB_CONFIG_READ_MAX bytes read. The last step tells how it ended. What is already
+ * stored is not written. What is written is read back and checked before its header makes it the newest copy
+ * (D-PRO-21). */
 #ifndef ARB_CONFIG_H
 #define ARB_CONFIG_H
 
@@ -45,7 +45,7 @@ enum {
     ARB_CONFIG_POLLS_MAX = 50 /* a job that waits longer for the memory, 250 ms, has failed */
 };
 
-/* How a start or a job ended; 0 or more is good. */
+/* Outcome of a start, a job or a step; 0 or more is good. */
 typedef enum {
     ARB_CONFIG_OK = 0,           /* a start: it is under way; a job: done */
     ARB_CONFIG_UNCHANGED = 1,    /* a job: done, nothing had to be written */
@@ -56,10 +56,10 @@ typedef enum {
     ARB_CONFIG_ERR_NUMBER = -4   /* no such configuration */
 } arb_config_status_t;
 
-/* Whose links are stored. */
+/* The owner of the links. */
 typedef struct {
-    /* Gives the links of the configuration to be saved. Called several times for each link, in any order;
-     * what it gives must stay the same until the job is over. */
+    /* Gives a link of the configuration to be saved. Called several times for each link, in any order. Links
+     * must not change until the job is over. */
     arb_splice_link_t link;
     profile_tlv_on_link_t on_link; /* takes the links that are read */
 } arb_config_user_t;
@@ -84,7 +84,7 @@ typedef struct {
     uint16_t length;
     uint32_t crc; /* register behind the string */
     /* The job. */
-    uint8_t phase;      /* what it is at, 0: there is none; private to arb_config.c */
+    uint8_t phase;      /* of the job, private to arb_config.c; 0: there is none */
     int8_t status;      /* how it ends, arb_config_status_t */
     bool writing;       /* a page is under way */
     uint8_t polls;      /* of a memory that is not ready */
@@ -110,12 +110,12 @@ typedef struct {
 void arb_config_init(arb_config_t *config, arb_nvm_t *nvm, const arb_config_user_t *user, void *ctx,
                      uint32_t now_ms);
 
-/* Does what is due: at most one page written, or ARB_CONFIG_READ_MAX bytes read. Returns, once for every
- * start that returned ARB_CONFIG_OK, how the job ended, after which the next one may be started; else
+/* Does what is due: writes one page at most, or reads ARB_CONFIG_READ_MAX bytes. Returns the outcome of a
+ * job, once for every start that returned ARB_CONFIG_OK; then the next one may be started. Otherwise returns
  * ARB_CONFIG_RUNNING. */
 arb_config_status_t arb_config_step(arb_config_t *config, arb_nvm_t *nvm, uint32_t now_ms);
 
-/* A job is under way. */
+/* Is a job under way? */
 static inline bool arb_config_busy(const arb_config_t *config)
 {
     return config->phase != 0;
@@ -127,14 +127,13 @@ static inline uint32_t arb_config_next_ms(const arb_config_t *config, uint32_t n
     return arb_config_busy(config) ? config->due_ms : now_ms + PDCP_TIME_FAR_MS;
 }
 
-/* Whether this configuration is stored. */
+/* Is this configuration stored? */
 static inline bool arb_config_has(const arb_config_t *config, uint8_t number)
 {
     return profile_tlv_has(config->numbers, number);
 }
 
-/* Whether this device is part of a stored configuration; now and then of one that is not, too
- * (profile_tlv_names). */
+/* Is this device part of a stored configuration? May be true of one that is not (profile_tlv_names). */
 static inline bool arb_config_names(const arb_config_t *config, const pdcp_identity_t *identity)
 {
     return profile_tlv_names(config->names, identity);

@@ -35,9 +35,9 @@ enum {
 typedef struct {
     uint32_t due_ms;
     arb_area_t newest;
-    uint8_t flags;    /* as they are to be */
-    uint8_t stored;   /* as they stand in the memory; those of the factory when nothing does */
-    uint8_t writing;  /* flags of the page under way; those that are stored: none is */
+    uint8_t flags;    /* as set */
+    uint8_t stored;   /* as in the memory; the default ones if there is nothing */
+    uint8_t writing;  /* flags of the page under way; equal to stored: none is */
     uint8_t failures; /* writes that failed, since the start, FFh at most */
     uint8_t damaged;  /* pages that were neither empty nor good at the start */
 } arb_flags_t;
@@ -45,8 +45,8 @@ typedef struct {
 /* Reads the newest good copy. Blocks for as long as the memory needs to be read. */
 void arb_flags_load(arb_flags_t *flags, arb_nvm_t *nvm);
 
-/* Sets the flags, and stores them when they are not what is stored. Others than ARB_FLAGS_STORED are left
- * out. */
+/* Sets the flags, and stores them if they differ from the stored ones. Only those of ARB_FLAGS_STORED
+ * count. */
 void arb_flags_set(arb_flags_t *flags, uint8_t value, uint32_t now_ms);
 
 /* The flags as they were set or stored last. */
@@ -55,7 +55,7 @@ static inline uint8_t arb_flags_get(const arb_flags_t *flags)
     return flags->flags;
 }
 
-/* Writes when it is due; at most one page a call. */
+/* Writes if it is due; at most one page a call. */
 void arb_flags_step(arb_flags_t *flags, arb_nvm_t *nvm, uint32_t now_ms);
 
 /* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to write. */

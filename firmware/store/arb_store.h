@@ -22,7 +22,7 @@
 enum {
     ARB_STORE_ENTRY = 7,
     ARB_STORE_DELAY_MS = 500,  /* after the last change: one write for a limb that powers up */
-    ARB_STORE_PAUSE_MS = 10000 /* between two writes: what changes meanwhile is stored together (D-BUS-43) */
+    ARB_STORE_PAUSE_MS = 10000 /* between two writes; changes in between are stored together (D-BUS-43) */
 };
 
 /* Bytes of one area, whole pages. */
@@ -37,7 +37,7 @@ typedef struct {
     bool changed;           /* the table is newer than the newest copy */
     arb_record_copy_t copy; /* the one being written; none while nothing is handed over */
     uint32_t due_ms;
-    uint32_t pause_ms; /* no write begins before; means something while pausing */
+    uint32_t pause_ms; /* no write begins before; valid while pausing */
     bool pausing;
     uint32_t failures; /* writes that failed, since the start */
     uint8_t damaged;   /* areas that were neither empty nor good at start-up */
@@ -46,11 +46,11 @@ typedef struct {
 /* Reads the newest good copy into bind, which must be empty. nvm must outlive the store. */
 void arb_store_load(arb_store_t *store, arb_nvm_t *nvm, pdcp_bind_t *bind);
 
-/* The table has changed: it is written ARB_STORE_DELAY_MS after the last change, and ARB_STORE_PAUSE_MS after
- * the last write. */
+/* Notes that the table has changed. It is written ARB_STORE_DELAY_MS after the last change, and not before
+ * ARB_STORE_PAUSE_MS after the last write. */
 void arb_store_touch(arb_store_t *store, uint32_t now_ms);
 
-/* Writes the next page when it is due; at most one page a call. */
+/* Writes the next page if it is due; at most one page a call. */
 void arb_store_step(arb_store_t *store, const pdcp_bind_t *bind, uint32_t now_ms);
 
 /* The time of the next call at the latest; now_ms + PDCP_TIME_FAR_MS when there is nothing to write. */

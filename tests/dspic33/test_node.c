@@ -6,6 +6,7 @@
 
 #include "arb_app.h"
 #include "fake.h"
+#include "fake_port.h"
 #include "limb.h"
 #include "unity.h"
 
@@ -58,9 +59,8 @@ static void on_input(void *ctx, uint8_t channel, const uint8_t *data, uint8_t le
     }
 }
 
-static bool can_send(void *ctx, const can_frame_t *frame)
+static bool take_frame(const can_frame_t *frame)
 {
-    (void)ctx;
     if (part_frames >= FRAMES_A_TIME) {
         return false;
     }
@@ -68,41 +68,7 @@ static bool can_send(void *ctx, const can_frame_t *frame)
     return true;
 }
 
-static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
-{
-    (void)ctx;
-    (void)bytes;
-    return size;
-}
-
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    (void)address;
-    memset(bytes, 0xFF, size);
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    (void)address;
-    (void)bytes;
-    (void)size;
-    return false;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    return -1;
-}
-
-static const arb_port_t arb_port = {.can_send = can_send,
-                                    .host_write = host_write,
-                                    .nvm_read = nvm_read,
-                                    .nvm_write = nvm_write,
-                                    .nvm_status = nvm_status};
+static fake_port_t outside; /* without a memory */
 
 static void step_world(void)
 {
@@ -154,7 +120,11 @@ static void run(uint32_t ms)
         ports[i] = (pdcp_device_port_t){.ctx = &devices[i], .input = on_input};
         TEST_ASSERT_TRUE(pdcp_device_init(&devices[i], limb_devices[i], &ports[i], NULL, i + 1u, 0));
     }
-    arb_app_init(&app, &arb_port, &settings, 0);
+    fake_port_init(&outside, NULL, 0);
+    outside.take_frame = take_frame;
+    outside.refuses = true;
+    outside.fails = true;
+    arb_app_init(&app, &outside.port, &settings, 0);
     if (setjmp(stopped) == 0) {
         (void)firmware_main();
     }

@@ -3,6 +3,7 @@
 #include <stdlib.h>
 #include <string.h>
 
+#include "fake_port.h"
 #include "unity.h"
 
 #ifdef __AVR__
@@ -11,113 +12,51 @@ enum { OUT_MAX = 640 };
 enum { OUT_MAX = 4096 };
 #endif
 
-/* The memory: only pages that were written take room, since a small machine holds this, too. */
-enum { PAGES = 6 };
+/* What these tests store: identities, flags, and short configurations. */
+static uint8_t identities[2][32];
+static uint8_t flag_pages[2][16];
+static uint8_t headers[2][16]; /* of configuration strings */
+static uint8_t strings[2][2 * ARB_PORT_NVM_PAGE];
+enum { FIRST = ARB_NVM_CONFIG_AT, SECOND = ARB_NVM_CONFIG_AT + ARB_CONFIG_AREA };
+static const fake_region_t regions[] = {
+    {0, sizeof identities[0], identities[0]},
+    {ARB_STORE_AREA, sizeof identities[1], identities[1]},
+    {ARB_NVM_FLAGS_AT, sizeof flag_pages[0], flag_pages[0]},
+    {ARB_NVM_FLAGS_AT + ARB_PORT_NVM_PAGE, sizeof flag_pages[1], flag_pages[1]},
+    {FIRST, sizeof headers[0], headers[0]},
+    {FIRST + ARB_PORT_NVM_PAGE, sizeof strings[0], strings[0]},
+    {SECOND, sizeof headers[1], headers[1]},
+    {SECOND + ARB_PORT_NVM_PAGE, sizeof strings[1], strings[1]},
+};
 
-static struct {
-    uint16_t address;
-    uint8_t bytes[ARB_PORT_NVM_PAGE];
-} pages[PAGES];
-static uint8_t page_count;
-static bool memory_works;
+static fake_port_t fake;
 static uint8_t out[OUT_MAX]; /* what the host has not looked at yet */
-static size_t out_len;
-static size_t taken; /* of the message that was taken last */
-static size_t room;
-
-static bool can_send(void *ctx, const can_frame_t *frame)
-{
-    (void)ctx;
-    (void)frame;
-    return false; /* exchange.c takes them from the queue */
-}
-
-static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
-{
-    (void)ctx;
-    const size_t count = size < room ? size : room;
-    TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(OUT_MAX, out_len + count, "the host has not looked for too long");
-    memcpy(&out[out_len], bytes, count);
-    out_len += count;
-    room -= count;
-    return count;
-}
-
-/* The page that holds this address; NULL: it was never written. */
-static uint8_t *page_of(uint16_t address)
-{
-    for (uint8_t i = 0; i < page_count; i++) {
-        if (pages[i].address == address - address % ARB_PORT_NVM_PAGE) {
-            return pages[i].bytes;
-        }
-    }
-    return NULL;
-}
-
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    for (uint16_t i = 0; i < size; i++) {
-        const uint16_t at = (uint16_t)(address + i);
-        const uint8_t *page = page_of(at);
-        bytes[i] = page != NULL ? page[at % ARB_PORT_NVM_PAGE] : 0xFF;
-    }
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    if (!memory_works) {
-        return false;
-    }
-    if (page_of(address) == NULL) {
-        TEST_ASSERT_LESS_THAN_MESSAGE(PAGES, page_count, "this memory is too small for the test");
-        pages[page_count].address = (uint16_t)(address - address % ARB_PORT_NVM_PAGE);
-        memset(pages[page_count].bytes, 0xFF, sizeof pages[0].bytes);
-        page_count++;
-    }
-    memcpy(&page_of(address)[address % ARB_PORT_NVM_PAGE], bytes, size);
-    return true;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    return 0;
-}
-
-static const arb_port_t port = {.can_send = can_send,
-                                .host_write = host_write,
-                                .nvm_read = nvm_read,
-                                .nvm_write = nvm_write,
-                                .nvm_status = nvm_status};
+static size_t taken;         /* of the message that was taken last */
 
 void hostlink_start(exchange_t *x, arb_app_t *app, bool strict)
 {
     const arb_settings_t settings = {
         .serial = EXCHANGE_SERIAL, .seed = EXCHANGE_SEED, .strict_crc = strict, .no_autoconfig = true};
-    page_count = 0;
-    memory_works = true;
-    out_len = 0;
+    fake_port_init(&fake, regions, sizeof regions / sizeof regions[0]);
+    fake.out = out;
+    fake.out_max = sizeof out;
     taken = 0;
-    room = SIZE_MAX;
-    exchange_start_app(x, app, &port, &settings, 0xFFFFFF00u);
+    exchange_start_app(x, app, &fake.port, &settings, 0xFFFFFF00u);
 }
 
 void hostlink_room(size_t bytes)
 {
-    room = bytes;
+    fake.room = bytes;
 }
 
 size_t hostlink_room_left(void)
 {
-    return room;
+    return fake.room;
 }
 
 void hostlink_memory_works(bool works)
 {
-    memory_works = works;
+    fake.refuses = !works;
 }
 
 void hostlink_bytes(exchange_t *x, const uint8_t *bytes, size_t len)
@@ -159,8 +98,8 @@ void hostlink_ask(exchange_t *x, uint16_t id, uint8_t reference, const uint8_t *
 
 static void drop_taken(void)
 {
-    out_len -= taken;
-    memmove(out, &out[taken], out_len);
+    fake.out_len -= taken;
+    memmove(out, &out[taken], fake.out_len);
     taken = 0;
 }
 
@@ -169,7 +108,7 @@ void hostlink_expect(const char *text)
     uint8_t bytes[64];
     const size_t len = parse(text, bytes, sizeof bytes);
     drop_taken();
-    TEST_ASSERT_GREATER_OR_EQUAL_MESSAGE(len, out_len, text);
+    TEST_ASSERT_GREATER_OR_EQUAL_MESSAGE(len, fake.out_len, text);
     TEST_ASSERT_EQUAL_HEX8_ARRAY_MESSAGE(bytes, out, len, text);
     taken = len;
 }
@@ -177,7 +116,7 @@ void hostlink_expect(const char *text)
 uint16_t hostlink_take(const uint8_t **payload, uint16_t *len)
 {
     drop_taken();
-    if (out_len < 8 || out_len < 8u + (size_t)(out[6] | out[7] << 8)) {
+    if (fake.out_len < 8 || fake.out_len < 8u + (size_t)(out[6] | out[7] << 8)) {
         return 0;
     }
     const uint16_t size = (uint16_t)(out[6] | out[7] << 8);
@@ -207,11 +146,11 @@ void hostlink_answer(uint16_t id, uint8_t reference, const uint8_t *payload, uin
 
 size_t hostlink_waiting(void)
 {
-    return out_len - taken;
+    return fake.out_len - taken;
 }
 
 void hostlink_silence(void)
 {
     drop_taken();
-    TEST_ASSERT_EQUAL_MESSAGE(0, out_len, "the host has got something");
+    TEST_ASSERT_EQUAL_MESSAGE(0, fake.out_len, "the host has got something");
 }

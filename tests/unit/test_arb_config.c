@@ -3,67 +3,15 @@
 #include <string.h>
 
 #include "arb_config.h"
+#include "fake_port.h"
 #include "unity.h"
 
 /* A memory that has only the beginnings of both areas, so that it fits 16-bit targets. */
 enum { PART = 1600, SECOND = ARB_NVM_CONFIG_AT + ARB_CONFIG_AREA };
 
 static uint8_t memory[2][PART];
-static int writes;
-static uint16_t read_most; /* bytes read in one step */
-static int busy;           /* polls until the page is written */
-static int writes_left;    /* until one fails; -1: none does */
-static int8_t status;      /* of the page written last */
-static int32_t bad_byte;   /* its lowest bit is always 0; -1: none */
-static int32_t lost_page;  /* what is written there is taken and lost; -1: none */
-
-static uint8_t *at_address(uint16_t address, uint16_t size)
-{
-    const uint16_t from = address >= (uint16_t)SECOND ? SECOND : ARB_NVM_CONFIG_AT;
-    TEST_ASSERT_GREATER_OR_EQUAL(from, address);
-    TEST_ASSERT_LESS_OR_EQUAL(PART, address - from + size);
-    return &memory[from == (uint16_t)SECOND ? 1 : 0][address - from];
-}
-
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    TEST_ASSERT_EQUAL_MESSAGE(0, busy, "read while a page is under way");
-    read_most = size > read_most ? size : read_most;
-    memcpy(bytes, at_address(address, size), size);
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    TEST_ASSERT_EQUAL_MESSAGE(0, busy, "written while a page is under way");
-    TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(ARB_PORT_NVM_PAGE, address % ARB_PORT_NVM_PAGE + size,
-                                      "crosses a page");
-    writes++;
-    status = writes_left == 0 ? -1 : 0;
-    writes_left -= writes_left >= 0 ? 1 : 0;
-    busy = 1;
-    if (status == 0 && address != lost_page) {
-        memcpy(at_address(address, size), bytes, size);
-    }
-    if (bad_byte >= address && bad_byte < (int32_t)address + size) {
-        *at_address((uint16_t)bad_byte, 1) &= 0xFEu;
-    }
-    return true;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    if (busy > 0) {
-        busy--;
-        return 1;
-    }
-    return status;
-}
-
-static const arb_port_t port = {.nvm_read = nvm_read, .nvm_write = nvm_write, .nvm_status = nvm_status};
+static const fake_region_t regions[2] = {{ARB_NVM_CONFIG_AT, PART, memory[0]}, {SECOND, PART, memory[1]}};
+static fake_port_t fake;
 static arb_nvm_t nvm;
 static arb_config_t config;
 static uint32_t now_ms;
@@ -72,22 +20,18 @@ static const arb_config_user_t user;
 
 static void power_on(void)
 {
-    busy = 0;
-    status = 0;
-    writes_left = -1;
-    bad_byte = -1;
-    lost_page = -1;
-    arb_nvm_init(&nvm, &port);
+    fake_port_power_on(&fake);
+    arb_nvm_init(&nvm, &fake.port);
     arb_config_init(&config, &nvm, &user, NULL, now_ms);
 }
 
 void setUp(void)
 {
-    memset(memory, 0xFF, sizeof memory);
+    fake_port_init(&fake, regions, 2);
+    fake.write_polls = 1;
     now_ms = 0xFFFFFFF0u; /* about to wrap */
     first_type = 0x5300;
     power_on();
-    writes = 0;
 }
 
 void tearDown(void) {}
@@ -111,13 +55,13 @@ static arb_config_status_t run(arb_config_status_t started)
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, started);
     done_count = 0;
     for (int steps = 0; arb_config_busy(&config); steps++) {
-        const int before = writes;
+        const int before = fake.writes;
         TEST_ASSERT_LESS_THAN(2000, steps);
         now_ms = arb_config_next_ms(&config, now_ms);
-        read_most = 0;
+        fake.read_most = 0;
         step();
-        TEST_ASSERT_LESS_OR_EQUAL(128, read_most);
-        TEST_ASSERT_LESS_OR_EQUAL(1, writes - before);
+        TEST_ASSERT_LESS_OR_EQUAL(128, fake.read_most);
+        TEST_ASSERT_LESS_OR_EQUAL(1, fake.writes - before);
     }
     TEST_ASSERT_EQUAL(1, done_count);
     TEST_ASSERT_EQUAL(ARB_NVM_NOBODY, nvm.owner);
@@ -197,7 +141,7 @@ static void test_an_empty_memory_reads_as_a_string_without_configurations(void)
     TEST_ASSERT_EQUAL(0, config.stored);
     /* What was read can be written back; it is what is stored already. */
     TEST_ASSERT_EQUAL(ARB_CONFIG_UNCHANGED, WRITE(1, 0, 0, 15, 0, 0));
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
 }
 
 /* The bytes in the memory, from the table in arb_config.h; the CRC-32 computed apart. */
@@ -209,7 +153,7 @@ static void test_the_stored_bytes(void)
     TEST_ASSERT_EQUAL_HEX8_ARRAY(header, memory[0], sizeof header);
     TEST_ASSERT_EQUAL_HEX8_ARRAY(string, &memory[0][64], sizeof string);
     TEST_ASSERT_EACH_EQUAL_HEX8(0xFF, memory[1], PART);
-    TEST_ASSERT_EQUAL(3, writes);
+    TEST_ASSERT_EQUAL(3, fake.writes);
     TEST_ASSERT_EQUAL(3, config.counters[ARB_CONFIG_PAGES]);
     TEST_ASSERT_EQUAL(1, config.counters[ARB_CONFIG_WRITES]);
     expect_string(string, sizeof string);
@@ -312,10 +256,10 @@ static void test_what_is_stored_is_not_written_again(void)
 {
     (void)save(7, 3, 0x5310);
     (void)save(8, 1, 0x5310);
-    writes = 0;
+    fake.writes = 0;
     TEST_ASSERT_EQUAL(ARB_CONFIG_UNCHANGED, save(7, 3, 0x5310));
     TEST_ASSERT_EQUAL(ARB_CONFIG_UNCHANGED, save(8, 1, 0x5310));
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
     TEST_ASSERT_EQUAL(2, config.counters[ARB_CONFIG_COUNT_UNCHANGED]);
     /* One link more, one less, one other: written. */
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, save(7, 4, 0x5310));
@@ -431,9 +375,9 @@ static void test_pieces_of_whole_pages_write_each_page_once(void)
 {
     const uint16_t len = make_string(string, 1, 6, 0x5300);
     (void)save(1, 1, 0x5300);
-    writes = 0;
+    fake.writes = 0;
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, write_pieces(string, len, 128));
-    TEST_ASSERT_EQUAL((354 + 63) / 64 + 1, writes);
+    TEST_ASSERT_EQUAL((354 + 63) / 64 + 1, fake.writes);
 }
 
 /* Equal from the beginning, then different in one byte: the equal beginning is copied. */
@@ -444,10 +388,10 @@ static void test_raw_writing_of_what_is_stored(void)
     (void)write_pieces(string, len, 354);
     (void)erase(1);
     (void)write_raw(string, len);
-    writes = 0;
+    fake.writes = 0;
     TEST_ASSERT_EQUAL(ARB_CONFIG_UNCHANGED, write_pieces(string, len, 100));
     TEST_ASSERT_EQUAL(ARB_CONFIG_UNCHANGED, write_pieces(string, len, 354));
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
     expect_string(string, len);
     for (size_t i = 0; i < sizeof changed_at / sizeof changed_at[0]; i++) {
         string[changed_at[i]] ^= 0x40;
@@ -567,10 +511,10 @@ static void test_a_failing_write_changes_nothing(void)
     for (int failing = 0; failing < 3; failing++) {
         setUp();
         (void)save(1, 1, 0x5300);
-        writes = 0;
-        writes_left = failing;
+        fake.writes = 0;
+        fake.good_writes = failing;
         TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(1, 1, 0x5311));
-        TEST_ASSERT_EQUAL(failing + 1, writes);
+        TEST_ASSERT_EQUAL(failing + 1, fake.writes);
         TEST_ASSERT_EQUAL(1, config.counters[ARB_CONFIG_FAILURES]);
         TEST_ASSERT_EQUAL(1, config.counters[ARB_CONFIG_WRITES]);
         expect_now((const uint8_t[]){1, 1, 0, 2, 1, 0, 3, 1, 0, LINK(1, 0), 15, 0, 0}, 69);
@@ -586,7 +530,7 @@ static void test_a_byte_that_cannot_be_written_is_noticed(void)
     for (size_t i = 0; i < sizeof bytes / sizeof bytes[0]; i++) {
         setUp();
         (void)save(1, 1, 0x5300);
-        bad_byte = bytes[i];
+        fake.bad_byte = bytes[i];
         TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(1, 1, 0x5311));
         expect_now((const uint8_t[]){1, 1, 0, 2, 1, 0, 3, 1, 0, LINK(1, 0), 15, 0, 0}, 69);
         power_on();
@@ -599,7 +543,7 @@ static void test_a_lost_header_is_noticed(void)
 {
     (void)save(1, 1, 0x5300);
     (void)save(1, 1, 0x5311);
-    lost_page = ARB_NVM_CONFIG_AT;
+    fake.lost_page = ARB_NVM_CONFIG_AT;
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(1, 1, 0x5300));
     EXPECT(1, 1, 0, 2, 1, 0, 3, 1, 0, LINK(1, 0x11), 15, 0, 0);
 }
@@ -607,10 +551,10 @@ static void test_a_lost_header_is_noticed(void)
 static void test_a_memory_that_hangs_ends_the_job(void)
 {
     const uint32_t before_ms = now_ms;
-    busy = 1000;
+    fake.polls_left = 1000;
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(1, 1, 0x5300));
     TEST_ASSERT_EQUAL(250, now_ms - before_ms);
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
 }
 
 /* D-PRO-21: The copy rots while the arbitrator runs: it is not used, and above all not copied under a good
@@ -619,10 +563,10 @@ static void test_damage_at_run_time_is_noticed(void)
 {
     (void)save(1, 1, 0x5300);
     memory[0][64 + 20] ^= 1;
-    writes = 0;
+    fake.writes = 0;
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, run(arb_config_read(&config)));
     TEST_ASSERT_EQUAL(ARB_CONFIG_ERR_STORAGE, save(2, 1, 0x5300));
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
 }
 
 static void test_the_memory_is_shared(void)
@@ -637,11 +581,11 @@ static void test_the_memory_is_shared(void)
         step();
         now_ms = arb_config_next_ms(&config, now_ms);
     }
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
     TEST_ASSERT_EQUAL(ARB_NVM_STORE, nvm.owner);
     /* The other's last page is under way and will fail: no concern of this job. */
-    busy = 3;
-    status = -1;
+    fake.polls_left = 3;
+    fake.status = -1;
     arb_nvm_give(&nvm, ARB_NVM_STORE);
     step();
     TEST_ASSERT_FALSE(arb_nvm_take(&nvm, ARB_NVM_STORE));

@@ -3,69 +3,29 @@
 
 #include "arb_crc.h"
 #include "arb_flags.h"
+#include "fake_port.h"
 #include "unity.h"
 
 static uint8_t memory[2 * 64];
-static int writes;
-static int busy;
-static bool failing;
-static bool refusing;
-static uint16_t cut_after; /* bytes of the next write that reach the memory */
-
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    TEST_ASSERT_GREATER_OR_EQUAL(1024, address);
-    TEST_ASSERT_LESS_OR_EQUAL(1024 + sizeof memory, address + size);
-    memcpy(bytes, &memory[address - 1024], size);
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    TEST_ASSERT_EQUAL(0, busy);
-    TEST_ASSERT_TRUE(address == 1024 || address == 1024 + 64);
-    if (refusing) {
-        return false;
-    }
-    writes++;
-    busy = 2;
-    memcpy(&memory[address - 1024], bytes, failing ? 0 : size < cut_after ? size : cut_after);
-    return true;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    if (busy > 0) {
-        busy--;
-        return 1;
-    }
-    return failing ? -1 : 0;
-}
-
-static const arb_port_t port = {.nvm_read = nvm_read, .nvm_write = nvm_write, .nvm_status = nvm_status};
+static const fake_region_t region = {ARB_NVM_FLAGS_AT, sizeof memory, memory};
+static fake_port_t fake;
 static arb_nvm_t nvm;
 static arb_flags_t flags;
 static uint32_t now_ms;
 
 static void power_on(void)
 {
-    busy = 0;
-    failing = false;
-    refusing = false;
-    cut_after = 64;
-    arb_nvm_init(&nvm, &port);
+    fake_port_power_on(&fake);
+    arb_nvm_init(&nvm, &fake.port);
     arb_flags_load(&flags, &nvm);
 }
 
 void setUp(void)
 {
-    memset(memory, 0xFF, sizeof memory);
+    fake_port_init(&fake, &region, 1);
+    fake.write_polls = 2;
     now_ms = 0xFFFFFFF0u;
     power_on();
-    writes = 0;
 }
 
 void tearDown(void) {}
@@ -96,7 +56,7 @@ static void test_from_the_factory(void)
     TEST_ASSERT_EQUAL_HEX8(0x03, arb_flags_get(&flags));
     TEST_ASSERT_TRUE(idle());
     set(0x03);
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
 }
 
 /* The bytes of the table in arb_flags.h; the CRC-32 computed apart. */
@@ -113,13 +73,13 @@ static void test_all_values_survive_and_the_pages_take_turns(void)
 {
     for (uint8_t value = 0; value < 16; value++) {
         set(value);
-        TEST_ASSERT_EQUAL(value + 1, writes);
+        TEST_ASSERT_EQUAL(value + 1, fake.writes);
         TEST_ASSERT_EQUAL(value % 2, flags.newest.area);
         power_on();
         TEST_ASSERT_EQUAL_HEX8(value, arb_flags_get(&flags));
         TEST_ASSERT_EQUAL(0, flags.damaged);
         set(value);
-        TEST_ASSERT_EQUAL(value + 1, writes);
+        TEST_ASSERT_EQUAL(value + 1, fake.writes);
     }
 }
 
@@ -140,16 +100,16 @@ static void test_there_and_back_before_it_is_written_writes_nothing(void)
     arb_flags_set(&flags, 0x00, now_ms);
     TEST_ASSERT_FALSE(idle());
     set(0x03);
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
 }
 
 static void test_a_change_while_the_page_is_under_way(void)
 {
     arb_flags_set(&flags, 0x01, now_ms);
     arb_flags_step(&flags, &nvm, now_ms);
-    TEST_ASSERT_EQUAL(1, writes);
+    TEST_ASSERT_EQUAL(1, fake.writes);
     set(0x02);
-    TEST_ASSERT_EQUAL(2, writes);
+    TEST_ASSERT_EQUAL(2, fake.writes);
     power_on();
     TEST_ASSERT_EQUAL_HEX8(0x02, arb_flags_get(&flags));
     arb_flags_set(&flags, 0x01, now_ms);
@@ -162,7 +122,7 @@ static void test_a_change_while_the_page_is_under_way(void)
 static void test_a_failing_write_is_repeated(void)
 {
     set(0x01);
-    failing = true;
+    fake.fails = true;
     arb_flags_set(&flags, 0x02, now_ms);
     for (int i = 0; i < 4; i++) {
         now_ms = arb_flags_next_ms(&flags, now_ms);
@@ -171,12 +131,12 @@ static void test_a_failing_write_is_repeated(void)
     TEST_ASSERT_EQUAL(1, flags.failures);
     TEST_ASSERT_EQUAL(now_ms + 500, arb_flags_next_ms(&flags, now_ms));
     TEST_ASSERT_EQUAL(ARB_NVM_NOBODY, nvm.owner);
-    failing = false;
-    refusing = true;
+    fake.fails = false;
+    fake.refuses = true;
     now_ms = arb_flags_next_ms(&flags, now_ms);
     arb_flags_step(&flags, &nvm, now_ms);
     TEST_ASSERT_EQUAL(2, flags.failures);
-    refusing = false;
+    fake.refuses = false;
     run();
     power_on();
     TEST_ASSERT_EQUAL_HEX8(0x02, arb_flags_get(&flags));
@@ -189,7 +149,8 @@ static void test_power_cuts(void)
         setUp();
         set(0x01);
         set(0x02);
-        cut_after = at;
+        fake.whole_writes = 0;
+        fake.cut_bytes = at;
         set(0x04);
         power_on();
         TEST_ASSERT_EQUAL_HEX8(at == 11 ? 0x04 : 0x02, arb_flags_get(&flags));
@@ -241,25 +202,25 @@ static void test_another_owner_is_waited_for(void)
         now_ms = arb_flags_next_ms(&flags, now_ms);
         arb_flags_step(&flags, &nvm, now_ms);
     }
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
     arb_nvm_give(&nvm, ARB_NVM_FLAGS); /* not its own */
     TEST_ASSERT_EQUAL(ARB_NVM_CONFIG, nvm.owner);
     arb_nvm_give(&nvm, ARB_NVM_CONFIG);
     run();
-    TEST_ASSERT_EQUAL(1, writes);
+    TEST_ASSERT_EQUAL(1, fake.writes);
 }
 
 /* Set and set back while another one's page is being written: whoever waits for the memory gets it. */
 static void test_there_and_back_while_the_memory_is_not_ready_gives_it_up(void)
 {
-    busy = 1;
+    fake.polls_left = 1;
     arb_flags_set(&flags, 0x01, now_ms);
     arb_flags_step(&flags, &nvm, now_ms);
     arb_flags_set(&flags, ARB_FLAGS_FACTORY, now_ms);
     TEST_ASSERT_TRUE(idle());
     arb_flags_step(&flags, &nvm, now_ms);
     TEST_ASSERT_TRUE(arb_nvm_take(&nvm, ARB_NVM_STORE));
-    TEST_ASSERT_EQUAL(0, writes);
+    TEST_ASSERT_EQUAL(0, fake.writes);
 }
 
 /* The usual check value of CRC-32. */

@@ -3,6 +3,7 @@
 
 #include "arb_app.h"
 #include "exchange.h"
+#include "fake_port.h"
 #include "unity.h"
 
 static exchange_t x;
@@ -12,80 +13,18 @@ static arb_app_t app;
 enum { KEPT = 256 };
 
 static uint8_t memory[ARB_AREAS * KEPT];
-static int writes_left; /* before the power fails; -1: it does not */
-static size_t bytes_left_of_last;
-
-static bool can_send(void *ctx, const can_frame_t *frame)
-{
-    (void)ctx;
-    (void)frame;
-    return false; /* exchange.c takes them from the queue */
-}
-
-static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
-{
-    (void)ctx;
-    (void)bytes;
-    return size; /* there is no host */
-}
-
-/* Where a byte of the identities stands; NULL: it is not kept. */
-static uint8_t *byte_of(uint16_t address)
-{
-    const uint16_t area = (uint16_t)(address / ARB_STORE_AREA);
-    const uint16_t at = (uint16_t)(address % ARB_STORE_AREA);
-    return area < ARB_AREAS && at < KEPT ? &memory[area * KEPT + at] : NULL;
-}
-
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    for (uint16_t i = 0; i < size; i++) { /* all others are empty */
-        const uint8_t *byte = byte_of((uint16_t)(address + i));
-        bytes[i] = byte != NULL ? *byte : 0xFF;
-    }
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    TEST_ASSERT_LESS_OR_EQUAL_MESSAGE(ARB_PORT_NVM_PAGE, address % ARB_PORT_NVM_PAGE + size,
-                                      "crosses a page");
-    uint8_t *page = byte_of(address);
-    TEST_ASSERT_NOT_NULL_MESSAGE(page, "this memory is too small for the test");
-    if (writes_left == 0) {
-        memcpy(page, bytes, bytes_left_of_last < size ? bytes_left_of_last : size);
-        bytes_left_of_last = 0;
-        return true;
-    }
-    writes_left -= writes_left > 0 ? 1 : 0;
-    memcpy(page, bytes, size);
-    return true;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    return 0;
-}
-
-static const arb_port_t port = {.can_send = can_send,
-                                .host_write = host_write,
-                                .nvm_read = nvm_read,
-                                .nvm_write = nvm_write,
-                                .nvm_status = nvm_status};
+static const fake_region_t regions[ARB_AREAS] = {{0, KEPT, memory}, {ARB_STORE_AREA, KEPT, &memory[KEPT]}};
+static fake_port_t fake;
 
 static void start(void)
 {
     const arb_settings_t settings = {.seed = EXCHANGE_SEED, .no_autoconfig = true};
-    exchange_start_app(&x, &app, &port, &settings, 0xFFFFFF00u);
+    exchange_start_app(&x, &app, &fake.port, &settings, 0xFFFFFF00u);
 }
 
 void setUp(void)
 {
-    memset(memory, 0xFF, sizeof memory);
-    writes_left = -1;
+    fake_port_init(&fake, regions, ARB_AREAS);
     start();
 }
 
@@ -128,11 +67,11 @@ static void test_power_may_fail_at_any_byte(void)
     int fresh = 0;
     for (size_t cut = 0; cut <= ARB_AREA_HEADER + 2 * ARB_STORE_ENTRY + ARB_AREA_CRC; cut++) {
         memcpy(memory, before, sizeof memory);
-        writes_left = -1;
+        fake_port_power_on(&fake);
         start();
         exchange_add_input(&x);
-        writes_left = 0;
-        bytes_left_of_last = cut;
+        fake.whole_writes = 0;
+        fake.cut_bytes = (uint16_t)cut;
         exchange_pass(&x, 600);
         start();
         const uint8_t count = app.arb.bus.bind.remembered_count;

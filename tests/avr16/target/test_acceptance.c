@@ -6,6 +6,7 @@
 #include <string.h>
 
 #include "arb_app.h"
+#include "fake_port.h"
 #include "pdcp_device.h"
 #include "unity.h"
 
@@ -94,49 +95,13 @@ static void deliver(const can_frame_t *frame, int sender)
     }
 }
 
-static bool can_send(void *ctx, const can_frame_t *frame)
+static bool take_frame(const can_frame_t *frame)
 {
-    (void)ctx;
     deliver(frame, PARTS);
     return true;
 }
 
-static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
-{
-    (void)ctx;
-    (void)bytes;
-    return size;
-}
-
-/* An empty memory, which takes all writes. */
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    (void)address;
-    memset(bytes, 0xFF, size);
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    (void)address;
-    (void)bytes;
-    (void)size;
-    return true;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    return 0;
-}
-
-static const arb_port_t port = {.can_send = can_send,
-                                .host_write = host_write,
-                                .nvm_read = nvm_read,
-                                .nvm_write = nvm_write,
-                                .nvm_status = nvm_status};
+static fake_port_t fake;
 
 /* --- Time --- */
 
@@ -186,7 +151,9 @@ void setUp(void)
     static const arb_settings_t settings = {.seed = 253, .strict_crc = true};
     now_ms = 0xFFFFFF00u; /* wraps */
     memset(plugged, 0, sizeof plugged);
-    arb_app_init(&app, &port, &settings, now_ms);
+    fake_port_init(&fake, NULL, 0);
+    fake.take_frame = take_frame;
+    arb_app_init(&app, &fake.port, &settings, now_ms);
     plug(D1);
     plug(D2);
     plug(D3);

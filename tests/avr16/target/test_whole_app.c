@@ -4,6 +4,7 @@
 #include <string.h>
 
 #include "arb_app.h"
+#include "fake_port.h"
 #include "unity.h"
 
 /* Does not compile with other capacities. */
@@ -15,57 +16,17 @@ static uint32_t now_ms;
 static can_frame_t sent[4]; /* by the application, oldest first */
 static uint8_t sent_count;
 
-static uint8_t answer[32]; /* bytes for the host */
-static uint8_t answer_len;
+static uint8_t answers[32]; /* bytes for the host */
+static fake_port_t fake;
 
-static bool can_send(void *ctx, const can_frame_t *frame)
+static bool take_frame(const can_frame_t *frame)
 {
-    (void)ctx;
     if (sent_count == sizeof sent / sizeof sent[0]) {
         return false;
     }
     sent[sent_count++] = *frame;
     return true;
 }
-
-static size_t host_write(void *ctx, const uint8_t *bytes, size_t size)
-{
-    (void)ctx;
-    TEST_ASSERT_LESS_OR_EQUAL(sizeof answer - answer_len, size);
-    memcpy(&answer[answer_len], bytes, size);
-    answer_len = (uint8_t)(answer_len + size);
-    return size;
-}
-
-/* An empty memory, which takes all writes. */
-static bool nvm_read(void *ctx, uint16_t address, uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    (void)address;
-    memset(bytes, 0xFF, size);
-    return true;
-}
-
-static bool nvm_write(void *ctx, uint16_t address, const uint8_t *bytes, uint16_t size)
-{
-    (void)ctx;
-    (void)address;
-    (void)bytes;
-    (void)size;
-    return true;
-}
-
-static int8_t nvm_status(void *ctx)
-{
-    (void)ctx;
-    return 0;
-}
-
-static const arb_port_t port = {.can_send = can_send,
-                                .host_write = host_write,
-                                .nvm_read = nvm_read,
-                                .nvm_write = nvm_write,
-                                .nvm_status = nvm_status};
 
 static void receive(uint16_t id, const uint8_t *data, uint8_t dlc)
 {
@@ -95,8 +56,11 @@ void setUp(void)
     static const arb_settings_t settings = {.seed = 253, .strict_crc = true};
     now_ms = 0xFFFFFF00u;
     sent_count = 0;
-    answer_len = 0;
-    arb_app_init(&app, &port, &settings, now_ms);
+    fake_port_init(&fake, NULL, 0);
+    fake.take_frame = take_frame;
+    fake.out = answers;
+    fake.out_max = sizeof answers;
+    arb_app_init(&app, &fake.port, &settings, now_ms);
     (void)arb_app_step(&app, now_ms);
     expect(0x100, BYTES(0x0A));
 }
@@ -152,8 +116,8 @@ static void test_a_device_is_bound_and_the_host_sees_it(void)
     bind_and_set_up();
     TEST_ASSERT_EQUAL(sizeof request, arb_app_on_bytes(&app, now_ms, request, sizeof request));
     (void)arb_app_step(&app, now_ms);
-    TEST_ASSERT_EQUAL(sizeof want, answer_len);
-    TEST_ASSERT_EQUAL_HEX8_ARRAY(want, answer, sizeof want);
+    TEST_ASSERT_EQUAL(sizeof want, fake.out_len);
+    TEST_ASSERT_EQUAL_HEX8_ARRAY(want, answers, sizeof want);
 }
 
 /* Its time passes: beacons every 500 ms, the write of the identity, and every 240 ms the audit asks whether

@@ -268,6 +268,21 @@ void exchange_add_input(exchange_t *x)
     exchange_rx(x, "012#0A");
 }
 
+uint8_t exchange_output(const exchange_t *x)
+{
+    return pdcp_tables_channel(&x->arb->bus.tables, 0, 1);
+}
+
+uint8_t exchange_input(const exchange_t *x)
+{
+    return pdcp_tables_channel(&x->arb->bus.tables, 1, 1);
+}
+
+const pdcp_channel_t *exchange_input_entry(const exchange_t *x)
+{
+    return &x->arb->bus.tables.channels[exchange_input(x)];
+}
+
 void exchange_start_limb(exchange_t *x)
 {
     exchange_start(x, 0xFFFFFF00u);

@@ -92,6 +92,19 @@ void exchange_start_limb(exchange_t *x);
  * enabled to the output. */
 extern const exchange_pair_t exchange_making[];
 
+/* Device 0003:0003:0009 as id 13h, bound and set up: one output, index 1, which gets node id FDh, or one input,
+ * index 1. It answers only what it must. */
+extern const exchange_pair_t exchange_third_output[];
+extern const exchange_pair_t exchange_third_input[];
+
+/* The device of exchange_add_output being set up again, behind its grant. It answers only what it must. */
+extern const exchange_pair_t exchange_first_again[];
+
+/* Channel numbers of that output and that input, and the input's entry. */
+uint8_t exchange_output(const exchange_t *x);
+uint8_t exchange_input(const exchange_t *x);
+const pdcp_channel_t *exchange_input_entry(const exchange_t *x);
+
 /* Makes that link, without a host. */
 void exchange_make_link(exchange_t *x);
 

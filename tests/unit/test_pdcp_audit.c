@@ -17,21 +17,6 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static uint8_t output(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
-}
-
-static uint8_t input(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
-}
-
-static const pdcp_channel_t *the_input(void)
-{
-    return &x.arb->bus.tables.channels[input()];
-}
-
 static void begin(bool planned)
 {
     exchange_make_link(&x);
@@ -66,7 +51,7 @@ static void expect_repair(uint8_t channel, uint8_t param)
     TEST_ASSERT_EQUAL(channel, exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
     TEST_ASSERT_EQUAL(param, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK)); /* it was active, and still is */
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
     exchange_clear(&x);
 }
 
@@ -91,22 +76,22 @@ static void test_each_parameter_is_compared(void)
 {
     begin(true);
     ask("311#03 04 01", "211#83 01 04 01 00");
-    expect_repair(output(), 4);
+    expect_repair(exchange_output(&x), 4);
     ask("312#03 04 01", "212#83 01 04 01 00");
-    expect_repair(input(), 4);
+    expect_repair(exchange_input(&x), 4);
     ask("311#03 05 01", "211#83 01 05 01 FD");
-    expect_repair(output(), 5);
+    expect_repair(exchange_output(&x), 5);
     setUp();
     begin(true);
     ask("311#03 04 01", "211#83 01 04 01 01 00");
     ask("312#03 04 01", "212#83 01 04 01 FF");
     ask("311#03 05 01", "211#83 01 05 01 FE 00");
     ask("312#03 07 01", "212#83 01 07 01 11 FD");
-    expect_repair(input(), 7);
+    expect_repair(exchange_input(&x), 7);
     ask("312#03 05 01", "212#83 01 05 01 0200 0300");
-    expect_repair(input(), 5);
+    expect_repair(exchange_input(&x), 5);
     ask("312#03 06 01", "212#83 01 06 01 0400 02");
-    expect_repair(input(), 6);
+    expect_repair(exchange_input(&x), 6);
     TEST_ASSERT_EQUAL(3, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
@@ -126,13 +111,13 @@ static void test_an_input_without_a_link(void)
     ask("312#03 06 01", "212#83 01 06 01 0400 01");
     exchange_run(&x, unnaming);
     TEST_ASSERT_EQUAL(6, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
 }
 
 /* One that named a source when it was set up is left to the profile layer until that has decided. */
 static void test_an_input_whose_source_is_not_decided(void)
 {
-    x.arb->bus.tables.channels[input()].source.index = 1;
+    x.arb->bus.tables.channels[exchange_input(&x)].source.index = 1;
     pdcp_arb_plan_links(x.arb, false);
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 239);
@@ -159,9 +144,9 @@ static void test_an_input_that_refused_to_be_disabled(void)
         {NULL, NULL},
     };
     exchange_make_link(&x);
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_run(&x, refusing);
-    TEST_ASSERT_TRUE(the_input()->enabled);
+    TEST_ASSERT_TRUE(exchange_input_entry(&x)->enabled);
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 180);
     exchange_silence(&x);
@@ -170,33 +155,33 @@ static void test_an_input_that_refused_to_be_disabled(void)
     exchange_silence(&x);
     ask("312#03 04 01", "212#83 01 04 01 01");
     exchange_run(&x, silencing);
-    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
 /* D-BUS-60: a host may read an output without a link: what it has enabled stays enabled. */
 static void test_an_output_that_the_host_has_enabled(void)
 {
-    x.arb->bus.tables.channels[output()].enabled = true;
+    x.arb->bus.tables.channels[exchange_output(&x)].enabled = true;
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 180);
     ask("311#03 04 01", "211#83 01 04 01 01");
     exchange_silence(&x);
-    TEST_ASSERT_TRUE(x.arb->bus.tables.channels[output()].enabled);
+    TEST_ASSERT_TRUE(x.arb->bus.tables.channels[exchange_output(&x)].enabled);
     TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
 /* It may have become silent on its own: then the tables learn it. */
 static void test_an_input_that_was_disabled_by_itself(void)
 {
-    x.arb->bus.tables.channels[input()].enabled = true;
+    x.arb->bus.tables.channels[exchange_input(&x)].enabled = true;
     pdcp_arb_audit(x.arb, x.now_ms);
     exchange_pass(&x, 180);
     ask("311#03 04 01", "211#83 01 04 01 00");
     exchange_pass(&x, 180);
     ask("312#03 04 01", "212#83 01 04 01 00");
     exchange_silence(&x);
-    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
     TEST_ASSERT_EQUAL(0, x.arb->bus.stats[PDCP_STAT_AUDIT]);
 }
 
@@ -212,7 +197,7 @@ static void test_a_source_that_is_not_kept(void)
         ask("312#03 07 01", "212#83 01 07 01 11 FE");
         ask("312#03 05 01", "212#83 01 05 01 0900 0900");
         if (turn < 3) {
-            expect_repair(input(), 5);
+            expect_repair(exchange_input(&x), 5);
         } else {
             TEST_ASSERT_EQUAL(turn == 3 ? 1 : 0, exchange_count(&x, PDCP_EVENT_AUDIT));
             exchange_clear(&x);
@@ -221,8 +206,8 @@ static void test_a_source_that_is_not_kept(void)
         ask("312#03 06 01", "212#83 01 06 01 0400 01");
     }
     TEST_ASSERT_EQUAL(6, x.arb->bus.stats[PDCP_STAT_AUDIT]);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link); /* data flows all the same */
-    for (int i = 0; i < 600; i++) {                         /* the minute passes, without answers */
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link); /* data flows all the same */
+    for (int i = 0; i < 600; i++) { /* the minute passes, without answers */
         exchange_pass(&x, 100);
         exchange_beacons(&x);
         (void)exchange_drain(&x);
@@ -249,7 +234,7 @@ static void test_three_repairs_in_more_than_a_minute(void)
             (void)exchange_drain(&x);
             exchange_rx(&x, "212#83 01 04 01 00");
         }
-        expect_repair(input(), 4);
+        expect_repair(exchange_input(&x), 4);
         for (int wait = 0; wait < 198; wait++) { /* 19.8 s */
             exchange_pass(&x, 100);
             exchange_beacons(&x);
@@ -263,35 +248,16 @@ static void test_three_repairs_in_more_than_a_minute(void)
 /* Device 0003:0003:0009 as id 13h: one input, index 1, linked to the same output. */
 static void link_second_input(void)
 {
-    static const exchange_pair_t binding[] = {
-        {"313#81 13 0300 0300 0900", NULL},
-        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"},
-        {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},
-        {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 01"},
-        {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 01"},
-        {"313#03 01 01", "213#83 01 01 01 0053 1011"},
-        {"313#03 05 01", "213#83 00 05 01"},
-        {"313#03 06 01", "213#83 00 06 01"},
-        {"313#03 08 01", "213#83 00 08 01"},
-        {"313#03 09 01", "213#83 00 09 01"},
-        {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#03 0B 01", "213#83 00 0B 01"},
-        {NULL, NULL},
-    };
     static const exchange_pair_t linking[] = {
         {"313#04 05 01 0200 0200", "213#84 01 05 01"}, {"313#04 06 01 0400 01", "213#84 01 06 01"},
         {"313#04 08 01 0050 2021", "213#84 01 08 01"}, {"313#04 07 01 11 FE", "213#84 01 07 01"},
         {"313#04 04 01 01", "213#84 01 04 01"},        {NULL, NULL},
     };
     exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, binding);
+    exchange_run(&x, exchange_third_input);
     exchange_rx(&x, "013#0A");
-    TEST_ASSERT_EQUAL(PDCP_OK,
-                      pdcp_arb_connect(x.arb, output(), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
+    TEST_ASSERT_EQUAL(
+        PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
     exchange_run(&x, linking);
     exchange_clear(&x);
 }
@@ -322,7 +288,7 @@ static void test_an_output_that_is_not_kept(void)
     TEST_ASSERT_EQUAL(2, exchange_count(&x, PDCP_EVENT_LINK));
     TEST_ASSERT_EQUAL(PDCP_ERR_DIFFERS, exchange_last(&x, PDCP_EVENT_LINK)->status);
     exchange_run(&x, silencing);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE,
                       x.arb->bus.tables.channels[pdcp_tables_channel(&x.arb->bus.tables, 2, 1)].link);
 }
@@ -361,7 +327,7 @@ static void test_an_answer_about_a_link_that_is_gone(void)
     ask("311#03 04 01", "211#83 01 04 01 01");
     exchange_pass(&x, 60);
     exchange_tx(&x, "312#03 04 01");
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_silence(&x);
     exchange_rx(&x, "212#83 01 04 01 00");
     exchange_run(&x, removing);
@@ -490,7 +456,7 @@ static void test_a_channel_without_a_link_goes_first_too(void)
     exchange_rx(&x, "212#84 01 04 01");
     exchange_tx(&x, "312#04 07 01 0000");
     exchange_rx(&x, "212#84 01 07 01");
-    TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
+    TEST_ASSERT_EQUAL(exchange_input(&x), exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
     TEST_ASSERT_EQUAL(4, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
 }
 

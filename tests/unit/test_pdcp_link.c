@@ -13,50 +13,24 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static uint8_t output(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
-}
-
-static uint8_t input(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
-}
-
-static const pdcp_channel_t *the_input(void)
-{
-    return &x.arb->bus.tables.channels[input()];
-}
-
-/* pdcp-bus.md 8: 5, 6, 8, 7 and enabled to the input, then enabled to the output. */
-static const exchange_pair_t making[] = {
-    {"312#04 05 01 0200 0200", "212#84 01 05 01 0200 0200"},
-    {"312#04 06 01 0400 01", "212#84 01 06 01 0400 01"},
-    {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
-    {"312#04 07 01 11 FE", "212#84 01 07 01 11 FE"},
-    {"312#04 04 01 01", "212#84 01 04 01 01"},
-    {"311#04 04 01 01", "211#84 01 04 01 01"},
-    {NULL, NULL},
-};
-
 static void make_link(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    exchange_run(&x, making);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
+    exchange_run(&x, exchange_making);
 }
 
 static void test_a_link_is_made_in_order(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    for (const exchange_pair_t *pair = making; pair->tx != NULL; pair++) {
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
+    for (const exchange_pair_t *pair = exchange_making; pair->tx != NULL; pair++) {
         TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE,
-                              the_input()->link); /* 2 only when the last write is answered */
+                              exchange_input_entry(&x)->link); /* 2 only when the last write is answered */
         exchange_tx(&x, pair->tx);
         exchange_silence(&x);
         exchange_rx(&x, pair->rx);
     }
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 }
@@ -66,7 +40,7 @@ static void test_the_same_link_again_costs_nothing(void)
 {
     make_link();
     exchange_clear(&x);
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
     TEST_ASSERT_EQUAL(PDCP_OK, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
@@ -74,11 +48,11 @@ static void test_the_same_link_again_costs_nothing(void)
 
 static void test_what_cannot_be_a_link(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, input(), output()));
-    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, PDCP_NONE, input()));
-    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, output(), 100)); /* a free entry */
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    TEST_ASSERT_EQUAL(PDCP_ERR_BUSY, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, exchange_input(&x), exchange_output(&x)));
+    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, PDCP_NONE, exchange_input(&x)));
+    TEST_ASSERT_EQUAL(PDCP_ERR_UNKNOWN, pdcp_arb_connect(x.arb, exchange_output(&x), 100)); /* a free entry */
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
+    TEST_ASSERT_EQUAL(PDCP_ERR_BUSY, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
 }
 
 /* D-BUS-21: what undoes a link that failed at a step: the steps before it and the step itself, in reverse
@@ -99,12 +73,12 @@ static const char *const refusals[] = {
 
 static void fail_at(int step)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     for (int i = 0; i < step; i++) {
-        exchange_tx(&x, making[i].tx);
-        exchange_rx(&x, making[i].rx);
+        exchange_tx(&x, exchange_making[i].tx);
+        exchange_rx(&x, exchange_making[i].rx);
     }
-    exchange_tx(&x, making[step].tx);
+    exchange_tx(&x, exchange_making[step].tx);
     exchange_rx(&x, refusals[step]);
     for (int i = step; i >= 0; i--) {
         exchange_tx(&x, undoing[i].tx);
@@ -113,10 +87,10 @@ static void fail_at(int step)
     }
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
-    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, the_input()->source.index);
-    TEST_ASSERT_FALSE(the_input()->enabled);
-    TEST_ASSERT_FALSE(x.arb->bus.tables.channels[output()].enabled);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
+    TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, exchange_input_entry(&x)->source.index);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
+    TEST_ASSERT_FALSE(x.arb->bus.tables.channels[exchange_output(&x)].enabled);
     TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_LINK_FAILED]);
 }
@@ -149,23 +123,23 @@ static void test_refused_output_is_undone(void)
 /* D-BUS-20: a device without the profile layer refuses parameter 8, and is linked all the same. */
 static void test_an_input_without_parameter_8_is_linked(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    for (int i = 0; making[i].tx != NULL; i++) {
-        exchange_tx(&x, making[i].tx);
-        exchange_rx(&x, i == 2 ? refusals[i] : making[i].rx);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
+    for (int i = 0; exchange_making[i].tx != NULL; i++) {
+        exchange_tx(&x, exchange_making[i].tx);
+        exchange_rx(&x, i == 2 ? refusals[i] : exchange_making[i].rx);
     }
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* D-BUS-21: a device falls silent in the middle: the failed write is undone with one try, not three. */
 static void test_silence_in_the_middle_ends_the_link(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    exchange_tx(&x, making[0].tx);
-    exchange_rx(&x, making[0].rx);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
+    exchange_tx(&x, exchange_making[0].tx);
+    exchange_rx(&x, exchange_making[0].rx);
     for (int i = 0; i < 3; i++) {
-        exchange_tx(&x, making[1].tx);
+        exchange_tx(&x, exchange_making[1].tx);
         exchange_pass(&x, 100);
     }
     exchange_tx(&x, undoing[1].tx);
@@ -176,11 +150,11 @@ static void test_silence_in_the_middle_ends_the_link(void)
 
 static void test_a_lost_answer_is_repeated_and_the_link_made(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
-    exchange_tx(&x, making[0].tx);
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
+    exchange_tx(&x, exchange_making[0].tx);
     exchange_pass(&x, 100);
-    exchange_run(&x, making);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    exchange_run(&x, exchange_making);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* Removing: input off, source back to unconnected; the output off when its last link goes. */
@@ -196,11 +170,11 @@ static void test_a_link_is_removed(void)
         {NULL, NULL},
     };
     make_link();
-    TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, output()));
+    TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, exchange_output(&x)));
     TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, PDCP_NONE));
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_run(&x, removing);
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
@@ -216,9 +190,9 @@ static void test_a_lost_source_is_silenced(void)
     exchange_pass(&x, 1000);
     exchange_rx(&x, "012#0A");
     exchange_pass(&x, 500);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     exchange_run(&x, silencing);
-    TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
+    TEST_ASSERT_EQUAL(4, exchange_input_entry(&x)->source.identity.sn);
     TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables)); /* inactive links count */
 }
 
@@ -240,7 +214,7 @@ static void test_silencing_is_repeated_until_it_is_answered(void)
     exchange_tx(&x, "312#04 07 01 00 00");
     exchange_rx(&x, "212#84 01 07 01 00 00");
     exchange_silence(&x);
-    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
 }
 
 /* The input's device is lost: its output has nobody to listen and is disabled. */
@@ -253,7 +227,7 @@ static void test_a_lost_input_disables_its_output(void)
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01 00");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* A lost device that comes back binds again and gets its old id and links. */
@@ -267,32 +241,11 @@ static void test_a_returning_source_gets_its_links_back(void)
     exchange_rx(&x, "212#84 01 04 01 00");
     exchange_tx(&x, "312#04 07 01 00 00");
     exchange_rx(&x, "212#84 01 07 01 00 00");
-    static const exchange_pair_t pairs[] = {
-        {"311#81 11 0200 0200 0400", NULL},
-        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
-        {"311#03 02 00", "211#83 01 02 00 0400"},
-        {"311#03 06 00", "211#83 00 06 00"},
-        {"311#03 0B 00", "211#83 00 0B 00"},
-        {"311#03 0A 00", "211#83 00 0A 00"},
-        {"311#03 09 00", "211#83 01 09 00 01"},
-        {"311#04 04 01 00", "211#84 01 04 01 00"},
-        {"311#03 03 01", "211#83 01 03 01 02"},
-        {"311#03 01 01", "211#83 01 01 01 0050 2021"},
-        {"311#03 09 01", "211#83 00 09 01"},
-        {"311#03 0A 01", "211#83 00 0A 01"},
-        {"311#04 05 01 FE", "211#84 01 05 01 FE"},
-        /* and at once its link */
-        {"312#04 05 01 0200 0200", "212#84 01 05 01 0200 0200"},
-        {"312#04 06 01 0400 01", "212#84 01 06 01 0400 01"},
-        {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
-        {"312#04 07 01 11 FE", "212#84 01 07 01 11 FE"},
-        {"312#04 04 01 01", "212#84 01 04 01 01"},
-        {"311#04 04 01 01", "211#84 01 04 01 01"},
-        {NULL, NULL},
-    };
     exchange_rx(&x, "611#01 0200 0200 0400");
-    exchange_run(&x, pairs);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    exchange_tx(&x, "311#81 11 0200 0200 0400");
+    exchange_pairs(&x, exchange_first_again);
+    exchange_run(&x, exchange_making); /* and at once its link */
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* D-BUS-14: the source is away for longer than its ids are kept; an unknown device that gets them is not
@@ -323,11 +276,11 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
         exchange_silence(&x);
     }
     TEST_ASSERT_EQUAL(0, x.arb->bus.tables.owner[0x11]);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(PDCP_NONE, the_input()->source.channel);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
+    TEST_ASSERT_EQUAL(PDCP_NONE, exchange_input_entry(&x)->source.channel);
     exchange_add_output(&x, "FD"); /* a freed id is given out last (D-BUS-36) */
     exchange_run(&x, making_again);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* pdcp-bus.md 7: the source that 5 and 6 name is bound: linked, and answered success when that is done. */
@@ -338,13 +291,13 @@ static void test_update_data_channel_links(void)
     exchange_rx(&x, "212#83 01 05 01 0200 0200");
     exchange_tx(&x, "312#03 06 01");
     exchange_rx(&x, "212#83 01 06 01 0400 01");
-    for (int i = 0; making[i].tx != NULL; i++) {
-        exchange_tx(&x, making[i].tx);
-        exchange_rx(&x, making[i].rx);
+    for (int i = 0; exchange_making[i].tx != NULL; i++) {
+        exchange_tx(&x, exchange_making[i].tx);
+        exchange_rx(&x, exchange_making[i].rx);
     }
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* Asked again for a link that is there: success without writing. */
@@ -358,7 +311,7 @@ static void test_update_data_channel_of_an_active_link(void)
     exchange_rx(&x, "212#83 01 06 01 0400 01");
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* Not present: remembered as inactive, answered failure, realised when the source appears. */
@@ -371,7 +324,7 @@ static void test_update_data_channel_waits_for_its_source(void)
     exchange_rx(&x, "212#83 01 06 01 0900 01");
     exchange_tx(&x, "312#8F 00 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 
     static const exchange_pair_t pairs[] = {
@@ -398,7 +351,7 @@ static void test_update_data_channel_waits_for_its_source(void)
     };
     exchange_rx(&x, "613#01 0300 0300 0900");
     exchange_run(&x, pairs);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 static void test_update_data_channel_of_what_is_no_input(void)
@@ -414,21 +367,12 @@ static void test_update_data_channel_of_what_is_no_input(void)
     exchange_rx(&x, "212#83 01 06 01 FFFF FF");
     exchange_tx(&x, "312#8F 00 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
 }
 
 /* 2307h replaces the input's source: the old output is disabled when nobody else listens to it. */
 static void test_a_source_is_replaced(void)
 {
-    static const exchange_pair_t binding[] = {
-        {"313#81 13 0300 0300 0900", NULL},        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"},  {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},       {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 01"},    {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 02"},    {"313#03 01 01", "213#83 01 01 01 0050 2021"},
-        {"313#03 09 01", "213#83 00 09 01"},       {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#04 05 01 FD", "213#84 01 05 01 FD"}, {NULL, NULL},
-    };
     static const exchange_pair_t replacing[] = {
         {"312#04 04 01 00", "212#84 01 04 01 00"},
         {"312#04 05 01 0300 0300", "212#84 01 05 01 0300 0300"},
@@ -442,24 +386,24 @@ static void test_a_source_is_replaced(void)
     };
     make_link();
     exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, binding);
-    TEST_ASSERT_EQUAL(PDCP_OK,
-                      pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), input()));
+    exchange_run(&x, exchange_third_output);
+    TEST_ASSERT_EQUAL(
+        PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), exchange_input(&x)));
     exchange_run(&x, replacing);
-    TEST_ASSERT_EQUAL(9, the_input()->source.identity.sn);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(9, exchange_input_entry(&x)->source.identity.sn);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
 /* The source is lost in the middle of making a link. */
 static void test_a_source_lost_in_the_middle_is_undone(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     for (int i = 0; i < 5; i++) {
-        exchange_tx(&x, making[i].tx);
-        exchange_rx(&x, making[i].rx);
+        exchange_tx(&x, exchange_making[i].tx);
+        exchange_rx(&x, exchange_making[i].rx);
     }
-    exchange_tx(&x, making[5].tx);
+    exchange_tx(&x, exchange_making[5].tx);
     exchange_rx(&x, "611#01 0200 0200 0400"); /* it was reset: any try unanswered shows it */
     exchange_pass(&x, 100);
     (void)exchange_drain(&x);
@@ -479,36 +423,17 @@ static void test_a_link_waits_for_the_hosts_request(void)
     uint8_t bytes[8];
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_get(x.arb, 1, 0, 8, bytes, sizeof bytes));
     exchange_tx(&x, "312#03 08 00");
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_silence(&x);
     exchange_rx(&x, "212#83 01 08 00 12");
     TEST_ASSERT_EQUAL(1, exchange_last(&x, PDCP_EVENT_REQUEST)->len);
     TEST_ASSERT_EQUAL_HEX8(0x12, bytes[0]);
-    exchange_run(&x, making);
+    exchange_run(&x, exchange_making);
 }
 
 /* Device 0003:0003:0009 as id 13h: one input, index 1, linked to the same output, which is on already. */
 static void link_second_input(void)
 {
-    static const exchange_pair_t binding[] = {
-        {"313#81 13 0300 0300 0900", NULL},
-        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"},
-        {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},
-        {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 01"},
-        {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 01"},
-        {"313#03 01 01", "213#83 01 01 01 0053 1011"},
-        {"313#03 05 01", "213#83 00 05 01"},
-        {"313#03 06 01", "213#83 00 06 01"},
-        {"313#03 08 01", "213#83 00 08 01"},
-        {"313#03 09 01", "213#83 00 09 01"},
-        {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#03 0B 01", "213#83 00 0B 01"},
-        {NULL, NULL},
-    };
     static const exchange_pair_t linking[] = {
         {"313#04 05 01 0200 0200", "213#84 01 05 01 0200 0200"},
         {"313#04 06 01 0400 01", "213#84 01 06 01 0400 01"},
@@ -518,10 +443,10 @@ static void link_second_input(void)
         {NULL, NULL},
     };
     exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, binding);
+    exchange_run(&x, exchange_third_input);
     exchange_rx(&x, "013#0A");
-    TEST_ASSERT_EQUAL(PDCP_OK,
-                      pdcp_arb_connect(x.arb, output(), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
+    TEST_ASSERT_EQUAL(
+        PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
     exchange_run(&x, linking);
 }
 
@@ -585,20 +510,20 @@ static void test_update_data_channel_does_not_end_the_silencing(void)
     exchange_tx(&x, "312#04 07 01 00 00");
     exchange_rx(&x, "212#84 01 07 01 00 00");
     exchange_silence(&x);
-    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
 }
 
 /* A link that was to be made again, and whose source has gone before its turn: that is told, and the input is
  * silenced. */
 static void test_a_link_whose_source_has_gone_is_not_made(void)
 {
-    pdcp_channel_t *channel = &x.arb->bus.tables.channels[input()];
+    pdcp_channel_t *channel = &x.arb->bus.tables.channels[exchange_input(&x)];
     channel->link = PDCP_LINK_INACTIVE;
     channel->enabled = true;
-    pdcp_ends_note(&x.arb->bus, input(), PDCP_TODO_CONNECT);
+    pdcp_ends_note(&x.arb->bus, exchange_input(&x), PDCP_TODO_CONNECT);
     exchange_step(&x);
     exchange_tx(&x, "312#04 04 01 00");
-    TEST_ASSERT_EQUAL(input(), exchange_last(&x, PDCP_EVENT_LINK)->channel);
+    TEST_ASSERT_EQUAL(exchange_input(&x), exchange_last(&x, PDCP_EVENT_LINK)->channel);
     TEST_ASSERT_EQUAL(PDCP_ERR_NO_ANSWER, exchange_last(&x, PDCP_EVENT_LINK)->status);
 }
 
@@ -606,10 +531,10 @@ static void test_a_link_whose_source_has_gone_is_not_made(void)
  * value is being written, which may get lost. It must not be taken for the answer to that (D-BUS-55). */
 static void test_an_answer_that_tells_of_another_value_is_late(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     for (int i = 0; i < 3; i++) {
-        exchange_tx(&x, making[i].tx);
-        exchange_rx(&x, making[i].rx);
+        exchange_tx(&x, exchange_making[i].tx);
+        exchange_rx(&x, exchange_making[i].rx);
     }
     exchange_tx(&x, "312#04 07 01 11 FE");
     exchange_rx(&x, "212#84 01 07 01 13 FD"); /* another source */

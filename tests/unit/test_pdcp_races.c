@@ -13,16 +13,6 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static uint8_t output(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 0, 1);
-}
-
-static uint8_t input(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
-}
-
 static const exchange_pair_t to_the_input[] = {
     {"312#04 05 01 0200 0200", "212#84 01 05 01"}, {"312#04 06 01 0400 01", "212#84 01 06 01"},
     {"312#04 08 01 0050 2021", "212#84 01 08 01"}, {"312#04 07 01 11 FE", "212#84 01 07 01"},
@@ -31,7 +21,7 @@ static const exchange_pair_t to_the_input[] = {
 
 static void connect_to_the_last_step(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_pairs(&x, to_the_input);
     exchange_tx(&x, "311#04 04 01 01");
 }
@@ -40,7 +30,7 @@ static void make_link(void)
 {
     connect_to_the_last_step();
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[input()].link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
 }
 
 /* The input's device is reset while the output's answer is awaited: there is no link, and the output is told
@@ -60,7 +50,7 @@ static void test_the_input_vanishes_at_the_last_step(void)
     exchange_tx(&x, "312#81 12 0200 0200 0600");
     exchange_tx(&x, "312#03 01 00");
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[input()].link);
+    TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
@@ -89,7 +79,7 @@ static void test_an_output_in_doubt_is_written_again(void)
     exchange_rx(&x, "212#84 01 06 01");
     exchange_tx(&x, "312#04 05 01 FFFF FFFF");
     exchange_rx(&x, "212#84 01 05 01");
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_tx(&x, "311#04 04 01 00"); /* the silencing goes on */
     exchange_rx(&x, "211#84 01 04 01");
     exchange_pairs(&x, to_the_input);
@@ -100,9 +90,9 @@ static void test_an_output_in_doubt_is_written_again(void)
  * before its turn. */
 static void test_a_waiting_request_ends_with_its_device(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_tx(&x, to_the_input[0].tx);
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_rx(&x, "611#01 0200 0200 0400");
     exchange_tx(&x, "311#03 01 00");
     exchange_pass(&x, 100);
@@ -117,9 +107,9 @@ static void test_a_waiting_request_ends_with_its_device(void)
 static void test_a_request_does_not_wait_for_ever(void)
 {
     x.arb->bus.tables.devices[1].ack_ms = 500;
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_tx(&x, to_the_input[0].tx); /* never answered: 1.5 s */
-    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, output(), input()));
+    TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_step(&x);
     exchange_pass(&x, 999);
     exchange_beacons(&x);
@@ -230,7 +220,7 @@ static void test_an_update_to_an_absent_source_silences_the_input(void)
     exchange_tx(&x, "312#04 07 01 0000");
     exchange_rx(&x, "212#84 01 07 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, x.arb->bus.tables.channels[input()].link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
 }
 
 /* D-BUS-19: when its source could not even be read, the device gets no answer and asks again. */
@@ -324,29 +314,20 @@ static const exchange_pair_t removing[] = {
 
 static void expect_no_link(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.tables.channels[input()].link);
-    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, x.arb->bus.tables.channels[input()].todo);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.tables.channels[exchange_input(&x)].link);
+    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, x.arb->bus.tables.channels[exchange_input(&x)].todo);
     TEST_ASSERT_TRUE(pdcp_arb_links_settled(x.arb));
 }
 
 static void test_a_removal_outlasts_a_link_that_fails(void)
 {
-    static const exchange_pair_t third[] = {
-        {"313#81 13 0300 0300 0900", NULL},        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"},  {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},       {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 01"},    {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 02"},    {"313#03 01 01", "213#83 01 01 01 0050 2021"},
-        {"313#03 09 01", "213#83 00 09 01"},       {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#04 05 01 FD", "213#84 01 05 01 FD"}, {NULL, NULL},
-    };
     make_link();
     exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, third);
-    TEST_ASSERT_EQUAL(PDCP_OK,
-                      pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), input()));
+    exchange_run(&x, exchange_third_output);
+    TEST_ASSERT_EQUAL(
+        PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), exchange_input(&x)));
     exchange_tx(&x, "312#04 04 01 00");
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_rx(&x, "212#84 00 04 01"); /* refused: the link that worked would be made anew */
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
@@ -361,7 +342,7 @@ static void test_a_removal_outlasts_an_absent_source(void)
     exchange_tx(&x, "312#03 05 01");
     exchange_rx(&x, "212#83 01 05 01 0300 0300");
     exchange_tx(&x, "312#03 06 01");
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_rx(&x, "212#83 01 06 01 0900 01"); /* to be silenced */
     exchange_tx(&x, "311#04 04 01 00");         /* by identifier */
     exchange_tx(&x, "312#8F 00 01");
@@ -375,7 +356,7 @@ static void test_a_removal_outlasts_the_source(void)
     make_link();
     exchange_rx(&x, "212#0F 01");
     exchange_tx(&x, "312#03 05 01");
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_rx(&x, "611#01 0200 0200 0400"); /* the source's device was reset */
     exchange_tx(&x, "311#03 01 00");
     exchange_pass(&x, 100);
@@ -397,7 +378,7 @@ static void test_a_removal_outlasts_an_update(void)
     make_link();
     exchange_rx(&x, "212#0F 01");
     exchange_tx(&x, "312#03 05 01");
-    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, input()));
+    TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_rx(&x, "212#0F 01"); /* it asks again */
     exchange_rx(&x, "212#83 01 05 01 0200 0200");
     exchange_tx(&x, "312#03 06 01");

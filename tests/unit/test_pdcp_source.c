@@ -13,16 +13,6 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static uint8_t input(void)
-{
-    return pdcp_tables_channel(&x.arb->bus.tables, 1, 1);
-}
-
-static const pdcp_channel_t *the_input(void)
-{
-    return &x.arb->bus.tables.channels[input()];
-}
-
 /* The source is lost: the link is inactive, the input silenced; 5, 6 and 8 stay. */
 static void lose_source(void)
 {
@@ -60,10 +50,10 @@ static void update(const char *vid_pid, const char *serial)
 
 static void expect_table(pdcp_link_status_t link, uint16_t sn, uint8_t index)
 {
-    TEST_ASSERT_EQUAL(link, the_input()->link);
-    TEST_ASSERT_EQUAL_HEX16(sn, the_input()->source.identity.sn);
-    TEST_ASSERT_EQUAL_HEX8(index, the_input()->source.index);
-    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, the_input()->todo);
+    TEST_ASSERT_EQUAL(link, exchange_input_entry(&x)->link);
+    TEST_ASSERT_EQUAL_HEX16(sn, exchange_input_entry(&x)->source.identity.sn);
+    TEST_ASSERT_EQUAL_HEX8(index, exchange_input_entry(&x)->source.index);
+    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, exchange_input_entry(&x)->todo);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_LINK)); /* no link has changed */
 }
 
@@ -113,7 +103,7 @@ static void test_an_inactive_link_is_named_and_not_made(void)
     update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 01");
     exchange_run(&x, naming);
     expect_table(PDCP_LINK_INACTIVE, 4, 1);
-    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
 }
 
 static const exchange_pair_t unnaming[] = {
@@ -218,7 +208,7 @@ static void test_a_source_lost_in_the_middle(void)
         }
     }
     exchange_pass(&x, 1);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     exchange_rx(&x, writing[3].rx);
     exchange_tx(&x, "312#8F 00 01");
     exchange_tx(&x, "312#04 04 01 00");
@@ -226,8 +216,8 @@ static void test_a_source_lost_in_the_middle(void)
     exchange_tx(&x, "312#04 07 01 0000");
     exchange_rx(&x, "212#84 01 07 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_FALSE(the_input()->enabled);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
+    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
 }
 
 /* The input's own device is lost in the middle: it answers a Reset. Its output has nobody to listen. */
@@ -248,8 +238,8 @@ static void test_an_input_lost_in_the_middle(void)
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
     exchange_silence(&x);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
+    TEST_ASSERT_EQUAL(4, exchange_input_entry(&x)->source.identity.sn);
 }
 
 /* The source of the remembered link. */
@@ -270,8 +260,8 @@ static void test_a_setup_that_finds_another_source(void)
     exchange_set_up_input(&x, "212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03",
                           "212#83 01 08 01 0050 2021");
     exchange_run(&x, naming);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(4, the_input()->source.identity.sn);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
+    TEST_ASSERT_EQUAL(4, exchange_input_entry(&x)->source.identity.sn);
 }
 
 /* 8 may be all that is wrong. */
@@ -317,7 +307,7 @@ static void test_a_link_that_is_made_is_not_written_once_more(void)
     exchange_set_up_input(&x, "212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03",
                           "212#83 01 08 01 0050 2021");
     exchange_run(&x, exchange_making);
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, the_input()->link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* D-PRO-15: a link of the configuration whose source is missing. */
@@ -331,10 +321,10 @@ static void test_a_remembered_link_is_named(void)
     };
     const pdcp_identity_t owner = {3, 3, 9};
     pdcp_arb_plan_links(x.arb, true);
-    pdcp_arb_remember(x.arb, x.now_ms, input(), &owner, 2, 0x5000, 0x2120);
+    pdcp_arb_remember(x.arb, x.now_ms, exchange_input(&x), &owner, 2, 0x5000, 0x2120);
     exchange_run(&x, missing);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, the_input()->link);
-    TEST_ASSERT_EQUAL(9, the_input()->source.identity.sn);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
+    TEST_ASSERT_EQUAL(9, exchange_input_entry(&x)->source.identity.sn);
 }
 
 int main(void)

@@ -113,21 +113,6 @@ static void test_a_mute_device_is_released_later(void)
 /* One that is lost is told when it is back, if it was not reset meanwhile (D-BUS-15). */
 static void test_a_lost_device_is_released_when_it_is_back(void)
 {
-    static const exchange_pair_t pairs[] = {
-        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
-        {"311#03 02 00", "211#83 01 02 00 0400"},
-        {"311#03 06 00", "211#83 00 06 00"},
-        {"311#03 0B 00", "211#83 00 0B 00"},
-        {"311#03 0A 00", "211#83 00 0A 00"},
-        {"311#03 09 00", "211#83 01 09 00 01"},
-        {"311#04 04 01 00", "211#84 01 04 01 00"},
-        {"311#03 03 01", "211#83 01 03 01 02"},
-        {"311#03 01 01", "211#83 01 01 01 0050 2021"},
-        {"311#03 09 01", "211#83 00 09 01"},
-        {"311#03 0A 01", "211#83 00 0A 01"},
-        {"311#04 05 01 FE", "211#84 01 05 01 FE"},
-        {NULL, NULL},
-    };
     exchange_pass(&x, 1495);
     exchange_rx(&x, "311#08 0000"); /* just before it is lost */
     exchange_pass(&x, 500);
@@ -136,7 +121,7 @@ static void test_a_lost_device_is_released_when_it_is_back(void)
     exchange_pass(&x, 500);
     exchange_silence(&x);
     exchange_rx(&x, "011#0A");
-    exchange_run(&x, pairs);
+    exchange_run(&x, exchange_first_again);
     exchange_pass(&x, 10);
     exchange_tx(&x, "311#09");
     exchange_rx(&x, "211#89 01");

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #define LOOP_EVENTS_MAX 16
+#define LOOP_FETCHES_MAX 16 /* in one round, for descriptors that stay ready */
 #define LOOP_NEVER UINT64_MAX
 
 /* One watched descriptor. The generation tells an event that was fetched for a removed descriptor from one
@@ -249,16 +250,37 @@ static void dispatch(loop_t *loop, const struct epoll_event *event)
     }
 }
 
-bool loop_run_once(loop_t *loop)
+/* Waits for events. Returns how many there are; none after a signal, such as the one that continues a stopped
+ * program. */
+static int fetch(loop_t *loop, struct epoll_event events[LOOP_EVENTS_MAX], int timeout_ms)
 {
-    struct epoll_event events[LOOP_EVENTS_MAX];
-    int n = epoll_wait(loop->epoll_fd, events, LOOP_EVENTS_MAX, prepare_sleep(loop));
-    loop->now_us = monotonic_us();
+    const int n = epoll_wait(loop->epoll_fd, events, LOOP_EVENTS_MAX, timeout_ms);
     if (n < 0 && errno != EINTR) {
         loop->stopped = true;
     }
+    return n;
+}
+
+static void dispatch_all(loop_t *loop, const struct epoll_event *events, int n)
+{
     for (int i = 0; i < n; i++) {
         dispatch(loop, &events[i]);
+    }
+}
+
+/* When the deadline is reached, all that came before now is handled first. The program may have been stopped
+ * since the last fetch, and would take for silent whoever spoke meanwhile. */
+bool loop_run_once(loop_t *loop)
+{
+    struct epoll_event events[LOOP_EVENTS_MAX];
+    int n = fetch(loop, events, prepare_sleep(loop));
+    loop->now_us = monotonic_us();
+    const bool is_due = loop->deadline_us <= loop->now_us;
+    dispatch_all(loop, events, n);
+    n = LOOP_EVENTS_MAX;
+    for (int i = 0; i < LOOP_FETCHES_MAX && is_due && !loop->stopped && n == LOOP_EVENTS_MAX; i++) {
+        n = fetch(loop, events, 0);
+        dispatch_all(loop, events, n);
     }
     return !loop->stopped;
 }

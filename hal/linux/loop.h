@@ -39,8 +39,9 @@ uint64_t loop_refresh_now_us(loop_t *loop);
  * time than the timer is armed for costs no system call: the loop then wakes once for nothing. */
 void loop_set_deadline_us(loop_t *loop, uint64_t deadline_us);
 
-/* Sleeps until a descriptor is ready, the deadline is reached or a signal came, and runs the handlers. False:
- * SIGTERM or SIGINT came, or loop_stop was called: the program should end. */
+/* Sleeps until a descriptor is ready, the deadline is reached or a signal came, and runs the handlers. When
+ * the deadline is reached, everything that had come by then has been handled. False: SIGTERM or SIGINT came,
+ * or loop_stop was called: the program should end. */
 bool loop_run_once(loop_t *loop);
 void loop_stop(loop_t *loop);
 

@@ -92,8 +92,8 @@ void exchange_start_limb(exchange_t *x);
  * enabled to the output. */
 extern const exchange_pair_t exchange_making[];
 
-/* Device 0003:0003:0009 as id 13h, bound and set up: one output, index 1, which gets node id FDh, or one input,
- * index 1. It answers only what it must. */
+/* Device 0003:0003:0009 as id 13h, bound and set up: one output, index 1, which gets node id FDh, or one
+ * input, index 1. It answers only what it must. */
 extern const exchange_pair_t exchange_third_output[];
 extern const exchange_pair_t exchange_third_input[];
 

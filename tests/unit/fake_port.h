@@ -1,4 +1,5 @@
-/* The one fake of everything that an application needs from outside (arb_port.h): controller, host and memory.
+/* The one fake of everything that an application needs from outside (arb_port.h): controller, host and
+ * memory.
  *
  * Hand &fake.port to the application. The test provides the parts of the memory that it needs, since a small
  * machine runs these tests as well; all else reads as FFh. The fake checks what the contract demands of the
@@ -49,8 +50,8 @@ typedef struct {
     int8_t status;
 } fake_port_t;
 
-/* A controller without room, a host that takes everything, an empty memory without faults. regions must outlive
- * fake; their bytes are set to FFh. */
+/* A controller without room, a host that takes everything, an empty memory without faults. regions must
+ * outlive fake; their bytes are set to FFh. */
 void fake_port_init(fake_port_t *fake, const fake_region_t *regions, uint8_t region_count);
 
 /* The faults go, the memory keeps what it has: as at the next power-on. */

@@ -1,6 +1,6 @@
-/* A device of the device role alone on a bus: frames are handed in and expected as data in hexadecimal, with spaces
- * wherever they help. The clock starts shortly before it wraps, so that every test but the shortest ones crosses
- * 2^32. Device 0002:0003:0004h, with id 10h once bound. */
+/* A device of the device role alone on a bus: frames are handed in and expected as data in hexadecimal, with
+ * spaces wherever they help. The clock starts shortly before it wraps, so that every test but the shortest
+ * ones crosses 2^32. Device 0002:0003:0004h, with id 10h once bound. */
 #ifndef SOLO_H
 #define SOLO_H
 
@@ -34,7 +34,8 @@ extern uint32_t solo_now;
 extern pdcp_device_t solo_dev;
 extern solo_seen_t solo_seen;
 
-/* Inputs 1 and 2, of which 2 is terminal, and output 3. Extras: 50h of channel 3 (writable), 51h of the device. */
+/* Inputs 1 and 2, of which 2 is terminal, and output 3. Extras: 50h of channel 3 (writable), 51h of the
+ * device. */
 extern const pdcp_device_desc_t solo_desc;
 extern const pdcp_device_port_t solo_port;
 extern char solo_long_text[1601]; /* the descriptor, 1600 bytes */

@@ -13,7 +13,8 @@ void talk_reset(void);
 
 /* --- frames: data in hexadecimal, id is the device's --- */
 
-/* A frame from the device comes in; the next frame that leaves goes to the device; the one after the other. */
+/* A frame from the device comes in; the next frame that leaves goes to the device; the one after the
+ * other. */
 void talk_from(unsigned id, const char *data);
 void talk_to(unsigned id, const char *data);
 void talk_answered(unsigned id, const char *request, const char *answer);
@@ -33,8 +34,8 @@ void talk_asks_for(unsigned id, unsigned serial);
 void talk_is_told(unsigned asked, unsigned id, unsigned serial);
 void talk_beacon(unsigned id);
 
-/* Parts of a setup: the device itself; the directions of its channels, one letter each, i or o; an output, which
- * gets out_id; an input. */
+/* Parts of a setup: the device itself; the directions of its channels, one letter each, i or o; an output,
+ * which gets out_id; an input. */
 void talk_set_up_device(unsigned id, unsigned serial, unsigned channels);
 void talk_set_up_directions(unsigned id, const char *channels);
 void talk_set_up_output(unsigned id, unsigned channel, unsigned out_id);

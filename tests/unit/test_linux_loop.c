@@ -3,9 +3,12 @@
 #include <errno.h>
 #include <signal.h>
 #include <stdint.h>
+#include <stdio.h>
 #include <string.h>
 #include <sys/epoll.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
+#include <time.h>
 #include <unistd.h>
 
 #include "loop.h"
@@ -119,7 +122,7 @@ static void replace_b(void *ctx, uint32_t events)
         TEST_ASSERT_EQUAL_INT(pipe_b[i], dup2(fresh[i], pipe_b[i]));
         close(fresh[i]);
     }
-    TEST_ASSERT_TRUE(loop_add(loop, pipe_b[0], EPOLLIN, count_only, &calls_b));
+    TEST_ASSERT_TRUE(loop_add(loop, pipe_b[0], EPOLLIN | EPOLLET, count_only, &calls_b));
 }
 
 static void test_event_of_an_old_descriptor_does_not_reach_its_successor(void)
@@ -240,6 +243,77 @@ static void test_idle_loop_uses_no_processor_time(void)
     TEST_ASSERT_LESS_OR_EQUAL_INT(3, after.ru_nvcsw - before.ru_nvcsw);
 }
 
+/* The state of a process as /proc tells it: S asleep, T stopped. */
+static void await_state(pid_t pid, char state)
+{
+    char path[32];
+    char text[256];
+    char now = '?';
+    (void)snprintf(path, sizeof path, "/proc/%d/stat", (int)pid);
+    while (now != state) {
+        FILE *file = fopen(path, "r");
+        if (file == NULL) {
+            _exit(1);
+        }
+        const char *behind_name = fgets(text, sizeof text, file) != NULL ? strrchr(text, ')') : NULL;
+        now = behind_name != NULL ? behind_name[2] : '?';
+        (void)fclose(file);
+    }
+}
+
+/* Stops its parent in its sleep, lets the deadline pass, gives it a byte and wakes it. */
+static void stop_parent(uint64_t deadline_us)
+{
+    struct timespec now;
+    const pid_t parent = getppid();
+    await_state(parent, 'S');
+    (void)kill(parent, SIGSTOP);
+    await_state(parent, 'T');
+    do {
+        (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    } while ((uint64_t)now.tv_sec * 1000000u + (uint64_t)now.tv_nsec / 1000u <= deadline_us);
+    _exit(write(pipe_a[1], "x", 1) == 1 && kill(parent, SIGCONT) == 0 ? 0 : 1);
+}
+
+/* A program that was stopped (Ctrl-Z, a debugger) finds its deadline passed and bytes that came before: it
+ * hears them before it judges who was silent. */
+static void test_what_came_while_it_was_stopped_is_handled_before_the_deadline(void)
+{
+    int status;
+    TEST_ASSERT_TRUE(loop_add(loop, pipe_a[0], EPOLLIN, read_a, &calls_a));
+    const uint64_t deadline_us = loop_refresh_now_us(loop) + 200000;
+    loop_set_deadline_us(loop, deadline_us);
+    const pid_t child = fork();
+    if (child == 0) {
+        stop_parent(deadline_us);
+    }
+    TEST_ASSERT_TRUE(loop_run_once(loop));
+    TEST_ASSERT_GREATER_OR_EQUAL_UINT64(deadline_us, loop_now_us(loop));
+    TEST_ASSERT_EQUAL_INT(1, calls_a);
+    TEST_ASSERT_EQUAL_INT(child, waitpid(child, &status, 0));
+    TEST_ASSERT_EQUAL_INT(0, status);
+}
+
+/* More descriptors are ready than one fetch takes: all are handled before the deadline is judged. */
+static void test_all_that_has_come_is_handled_before_the_deadline(void)
+{
+    enum { PIPES = 40 };
+    int ends[PIPES][2];
+    int calls = 0;
+    for (int i = 0; i < PIPES; i++) {
+        TEST_ASSERT_EQUAL_INT(0, pipe(ends[i]));
+        TEST_ASSERT_TRUE(loop_add(loop, ends[i][0], EPOLLIN | EPOLLET, count_only, &calls));
+        put_byte(ends[i]);
+    }
+    round_now();
+    TEST_ASSERT_EQUAL_INT(PIPES, calls);
+    for (int i = 0; i < PIPES; i++) {
+        loop_remove(loop, ends[i][0]);
+        close(ends[i][0]);
+        close(ends[i][1]);
+    }
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -254,6 +328,8 @@ int main(void)
     RUN_TEST(test_sigterm_and_sigint_end_the_program);
     RUN_TEST(test_stop_ends_the_round_after_the_other_handlers);
     RUN_TEST(test_sigpipe_is_ignored);
+    RUN_TEST(test_what_came_while_it_was_stopped_is_handled_before_the_deadline);
+    RUN_TEST(test_all_that_has_come_is_handled_before_the_deadline);
     RUN_TEST(test_idle_loop_uses_no_processor_time);
     return UNITY_END();
 }

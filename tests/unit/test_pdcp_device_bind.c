@@ -1,5 +1,5 @@
-/* The device role (D-BUS-16): asking for a node id, beacons, and the queue, against frames written by hand from
- * pdcp-bus.md 3 and 9. */
+/* The device role (D-BUS-16): asking for a node id, beacons, and the queue, against frames written by hand
+ * from pdcp-bus.md 3 and 9. */
 #include <stdio.h>
 
 #include "solo.h"

@@ -1,5 +1,5 @@
-/* The device role (D-BUS-16): channel data, Suspend, Reset, Update Data Channel and the silence of the arbitrator,
- * against frames written by hand from pdcp-bus.md 7, 9 and 10. */
+/* The device role (D-BUS-16): channel data, Suspend, Reset, Update Data Channel and the silence of the
+ * arbitrator, against frames written by hand from pdcp-bus.md 7, 9 and 10. */
 #include "solo.h"
 #include "unity.h"
 

@@ -1,5 +1,5 @@
-/* The device role (D-BUS-16): parameters and malformed frames, against frames written by hand from the tables of
- * pdcp-bus.md 2 and 4. */
+/* The device role (D-BUS-16): parameters and malformed frames, against frames written by hand from the tables
+ * of pdcp-bus.md 2 and 4. */
 #include "solo.h"
 #include "unity.h"
 

@@ -1,5 +1,5 @@
-/* Tables and queues that are full, setups that fail, and what then becomes of node ids (pdcp-bus.md 3, 5, 6); with
- * hand-written frames. */
+/* Tables and queues that are full, setups that fail, and what then becomes of node ids (pdcp-bus.md 3, 5, 6);
+ * with hand-written frames. */
 #include <string.h>
 
 #include "talk.h"

@@ -19,7 +19,11 @@
 #include "sim_world.h"
 #include "socketcand_server.h"
 
-enum { RECEIVE_BATCH = 32, HOST_BATCH = 256 };
+enum {
+    RECEIVE_BATCH = 32,
+    HOST_BATCH = 256,
+    STALL_US = 50000 /* a world that is called later than this was stopped */
+};
 
 typedef struct {
     pdcpd_options_t options;
@@ -34,7 +38,9 @@ typedef struct {
 
     hal_can_t *can; /* a bus outside; NULL: the one in world */
 
-    sim_world_t *world; /* NULL: the bus is outside */
+    sim_world_t *world;     /* NULL: the bus is outside */
+    uint64_t world_due_us;  /* when the world wants to go on, by the loop's clock */
+    uint64_t world_late_us; /* how far its clock is behind the loop's */
     socketcand_server_t *server;
     node_ini_t *inis[PDCPD_NODES_MAX];
     sim_node_t *nodes[PDCPD_NODES_MAX];
@@ -265,10 +271,21 @@ static void work_outside(daemon_t *daemon)
     loop_set_deadline_us(daemon->loop, wait_ms > 0 ? tick_us + (uint64_t)wait_ms * 1000u : now_us);
 }
 
+/* The world's time. It stands still while the process is stopped or a slow disk holds it up: programs on the bus
+ * have gone on speaking meanwhile, and their frames come in only now. */
+static uint64_t world_now_us(daemon_t *daemon)
+{
+    const uint64_t now_us = loop_now_us(daemon->loop);
+    if (now_us > daemon->world_due_us + STALL_US) {
+        daemon->world_late_us += now_us - daemon->world_due_us;
+    }
+    return now_us - daemon->world_late_us;
+}
+
 /* One turn with the bus in this process. */
 static void work_world(daemon_t *daemon)
 {
-    const uint64_t now_us = loop_now_us(daemon->loop);
+    const uint64_t now_us = world_now_us(daemon);
     (void)sim_world_run(daemon->world, now_us);
     if (daemon->uart_ready) {
         take_host_bytes(daemon, sim_world_ms(daemon->world));
@@ -280,7 +297,8 @@ static void work_world(daemon_t *daemon)
         next_us = sim_world_run(daemon->world, now_us);
         again = daemon->server != NULL && socketcand_server_poll(daemon->server);
     } while (again);
-    loop_set_deadline_us(daemon->loop, next_us);
+    daemon->world_due_us = next_us != SIM_BUS_NEVER ? next_us + daemon->world_late_us : UINT64_MAX - STALL_US;
+    loop_set_deadline_us(daemon->loop, daemon->world_due_us);
 }
 
 /* --- start and end --- */
@@ -435,6 +453,7 @@ static void close_all(daemon_t *daemon)
 
 static void run(daemon_t *daemon)
 {
+    daemon->world_due_us = loop_now_us(daemon->loop);
     daemon->uart_ready = true;
     do {
         if (daemon->world != NULL) {

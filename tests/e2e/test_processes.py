@@ -1,5 +1,7 @@
 """Devices as processes of their own on the simulated bus: links, values, loss and return."""
 
+import os
+import signal
 import struct
 import threading
 import time
@@ -23,6 +25,7 @@ LINKS = {
 }
 BEACON_MS = 200
 IDS_KEPT_S = 10.0
+STOPPED_S = 1.5  # more than three beacons, less than the 3 s after which a device counts itself alone
 NODE_ID = 8  # parameter of a device
 OUTPUT_ID = 5  # parameter of an output
 
@@ -153,6 +156,19 @@ def test_values_arrive(limb: Limb) -> None:
     until(lambda: is_part(wrist, limb.log.data_of(sensor_id)), f"the sensor has sent {wrist}")
     grip = {value.value for value in values if value.channel == 2}
     assert grip == {0, 1}
+
+
+def test_a_stopped_daemon_declares_nobody_lost(limb: Limb) -> None:
+    """Stopped for longer than three beacons (Ctrl-Z, a debugger), it hears what came meanwhile before it judges."""
+    limb.make_links()
+    limb.arriving(3)
+    os.kill(limb.pdcpd.process.pid, signal.SIGSTOP)
+    time.sleep(STOPPED_S)
+    os.kill(limb.pdcpd.process.pid, signal.SIGCONT)
+    limb.arriving(60)
+    assert limb.is_linked()
+    assert not [line for line in limb.pdcpd.errors if "is gone" in line]
+    assert limb.host.stats(0)["lost"] == 0
 
 
 @pytest.mark.parametrize("name", ["d1", "d2", "d3"])

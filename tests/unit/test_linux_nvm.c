@@ -1,6 +1,8 @@
 /* Non-volatile memory in a file: what is on the disk is looked at with plain file functions. */
 #define _GNU_SOURCE
 #include <fcntl.h>
+#include <pthread.h>
+#include <semaphore.h>
 #include <signal.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -43,10 +45,19 @@ static hal_nvm_t *open_good(const char *where)
     return nvm;
 }
 
+/* How the write under way ends. */
+static hal_nvm_status_t outcome(hal_nvm_t *nvm)
+{
+    while (hal_nvm_status(nvm) == HAL_NVM_BUSY) {
+        nvm_contract_wait();
+    }
+    return hal_nvm_status(nvm);
+}
+
 static void write_good(hal_nvm_t *nvm, uint16_t address, const char *text)
 {
     TEST_ASSERT_TRUE(hal_nvm_write(nvm, address, (const uint8_t *)text, (uint16_t)strlen(text)));
-    TEST_ASSERT_EQUAL_INT(HAL_NVM_IDLE, hal_nvm_status(nvm));
+    TEST_ASSERT_EQUAL_INT(HAL_NVM_IDLE, outcome(nvm));
 }
 
 static void expect_file(size_t address, const char *text)
@@ -172,7 +183,7 @@ static void test_failed_write_is_reported_and_the_next_one_may_succeed(void)
     hal_nvm_t *nvm = open_good(path);
     limit_file_size(1024);
     TEST_ASSERT_TRUE(hal_nvm_write(nvm, 2048, (const uint8_t *)"x", 1));
-    hal_nvm_status_t status = hal_nvm_status(nvm);
+    hal_nvm_status_t status = outcome(nvm);
     limit_file_size(RLIM_INFINITY);
     TEST_ASSERT_EQUAL_INT(HAL_NVM_FAILED, status);
     expect_file(0, "");
@@ -204,6 +215,87 @@ static void test_memory_without_a_file_starts_empty_each_time(void)
     }
 }
 
+/* A disk that is slow: it writes when the test lets it. The linker puts this in front of the real one. */
+static sem_t disk;
+static bool disk_is_held;
+static pthread_t caller; /* the thread of the tests */
+
+int __real_fdatasync(int fd);
+int __wrap_fdatasync(int fd);
+
+int __wrap_fdatasync(int fd)
+{
+    if (disk_is_held) {
+        TEST_ASSERT_FALSE_MESSAGE(pthread_equal(pthread_self(), caller), "the caller waits for the disk");
+        while (sem_wait(&disk) != 0) {
+        }
+    }
+    return __real_fdatasync(fd);
+}
+
+static void test_a_slow_disk_holds_nobody_up(void)
+{
+    uint8_t byte;
+    hal_nvm_t *nvm = open_good(path);
+    TEST_ASSERT_EQUAL_INT(0, sem_init(&disk, 0, 0));
+    caller = pthread_self();
+    disk_is_held = true;
+    TEST_ASSERT_TRUE(hal_nvm_write(nvm, 64, (const uint8_t *)"slow", 4));
+    TEST_ASSERT_EQUAL_INT(HAL_NVM_BUSY, hal_nvm_status(nvm));
+    TEST_ASSERT_FALSE(hal_nvm_write(nvm, 128, (const uint8_t *)"no", 2));
+    TEST_ASSERT_TRUE(hal_nvm_read(nvm, 0, &byte, 1));
+    disk_is_held = false;
+    TEST_ASSERT_EQUAL_INT(0, sem_post(&disk));
+    TEST_ASSERT_EQUAL_INT(HAL_NVM_IDLE, outcome(nvm));
+    expect_file(64, "slow");
+    linux_nvm_close(nvm);
+    (void)sem_destroy(&disk);
+}
+
+static void test_the_end_waits_for_the_write_under_way(void)
+{
+    hal_nvm_t *nvm = open_good(path);
+    TEST_ASSERT_TRUE(hal_nvm_write(nvm, 64, (const uint8_t *)"last", 4));
+    linux_nvm_close(nvm);
+    expect_file(64, "last");
+}
+
+static void expect_refused(const char *reason)
+{
+    char expected[200];
+    TEST_ASSERT_NULL(linux_nvm_open(path, error, sizeof error));
+    (void)snprintf(expected, sizeof expected, "%s: %s", path, reason);
+    TEST_ASSERT_EQUAL_STRING(expected, error);
+}
+
+/* Whoever can put another file in its place, or write to it, decides what the limb does. */
+static void test_files_that_others_may_write_are_refused(void)
+{
+    char target[80];
+    (void)snprintf(target, sizeof target, "%s/target", folder);
+    TEST_ASSERT_EQUAL_INT(0, symlink(target, path));
+    expect_refused("is a symbolic link");
+    TEST_ASSERT_EQUAL_INT(-1, access(target, F_OK));
+    TEST_ASSERT_EQUAL_INT(0, unlink(path));
+    make_file(HAL_NVM_SIZE);
+    TEST_ASSERT_EQUAL_INT(0, chmod(path, 0620));
+    expect_refused("may be written by others");
+    TEST_ASSERT_EQUAL_INT(0, chmod(path, 0602));
+    expect_refused("may be written by others");
+    TEST_ASSERT_EQUAL_INT(0, chmod(path, 0644));
+    linux_nvm_close(open_good(path));
+}
+
+static void test_a_file_of_another_user_is_refused(void)
+{
+    if (geteuid() != 0) {
+        TEST_IGNORE_MESSAGE("only root can give a file away");
+    }
+    make_file(HAL_NVM_SIZE);
+    TEST_ASSERT_EQUAL_INT(0, chown(path, 1234, 1234));
+    expect_refused("belongs to another user");
+}
+
 /* The contract, on a file. */
 hal_nvm_t *nvm_contract_open(void)
 {
@@ -217,7 +309,10 @@ hal_nvm_t *nvm_contract_reopen(hal_nvm_t *nvm)
     return nvm_contract_open();
 }
 
-void nvm_contract_wait(void) {}
+void nvm_contract_wait(void)
+{
+    (void)usleep(10000); /* the disk is another one's; nothing tells when it is done */
+}
 
 int main(void)
 {
@@ -234,5 +329,9 @@ int main(void)
     RUN_TEST(test_failed_write_is_reported_and_the_next_one_may_succeed);
     RUN_TEST(test_file_that_cannot_be_filled_is_left_empty);
     RUN_TEST(test_memory_without_a_file_starts_empty_each_time);
+    RUN_TEST(test_a_slow_disk_holds_nobody_up);
+    RUN_TEST(test_the_end_waits_for_the_write_under_way);
+    RUN_TEST(test_files_that_others_may_write_are_refused);
+    RUN_TEST(test_a_file_of_another_user_is_refused);
     return UNITY_END();
 }

@@ -7,10 +7,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <unistd.h>
 
 #include "arb_version.h"
 #include "hal_can.h"
 #include "hal_sys.h"
+#include "line_writer.h"
 #include "linux_can.h"
 #include "loop.h"
 #include "node_ini.h"
@@ -21,6 +23,7 @@ enum {
     RECEIVE_BATCH = 32,
     FILTERS_MAX = 256,
     EXIT_BAD_START = 2,
+    PATIENCE_MS = 500, /* for the last lines to be read */
     OPTION_SEED = 's',
     OPTION_STATS = 1,
     OPTION_VERSION
@@ -36,6 +39,7 @@ typedef struct {
 } options_t;
 
 typedef struct {
+    line_writer_t *out; /* standard output: what inputs receive */
     loop_t *loop;
     hal_can_t *can;
     node_ini_t *inis[NODES_MAX];
@@ -122,7 +126,9 @@ static error_t on_option(int key, char *text, struct argp_state *state)
 
 static void on_event(void *ctx, const sim_node_event_t *event)
 {
-    sim_node_print(ctx, event);
+    char line[SIM_NODE_LINE];
+    sim_node_format(line, event);
+    line_writer_put(((app_t *)ctx)->out, "%s", line);
 }
 
 /* The node whose frame would win arbitration. NULL: nobody has one. */
@@ -259,6 +265,10 @@ static bool open_all(app_t *app, const options_t *options)
             return complain(error);
         }
     }
+    app->out = line_writer_open(STDOUT_FILENO, "{\"lost\":", "}");
+    if (app->out == NULL) {
+        return complain("the thread for lines cannot be started");
+    }
     app->loop = loop_create();
     if (app->loop == NULL) {
         return complain("the event loop cannot be made");
@@ -268,7 +278,7 @@ static bool open_all(app_t *app, const options_t *options)
         return complain(error);
     }
     for (size_t i = 0; i < options->file_count; i++) {
-        app->nodes[i] = sim_node_open(app->inis[i], seed, loop_refresh_now_us(app->loop), on_event, stdout,
+        app->nodes[i] = sim_node_open(app->inis[i], seed, loop_refresh_now_us(app->loop), on_event, app,
                                       error, sizeof error);
         if (app->nodes[i] == NULL) {
             return complain(error);
@@ -290,6 +300,7 @@ static void close_all(app_t *app)
     if (app->loop != NULL) {
         loop_destroy(app->loop);
     }
+    line_writer_close(app->out, PATIENCE_MS);
 }
 
 static void print_stats(const app_t *app)
@@ -321,7 +332,7 @@ static int run(app_t *app)
 {
     do {
         work(app);
-        if (ferror(stdout) != 0) {
+        if (line_writer_is_broken(app->out)) {
             (void)complain("standard output cannot be written");
             return EXIT_FAILURE;
         }
@@ -348,7 +359,6 @@ int main(int argc, char **argv)
     if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
         return EXIT_BAD_START;
     }
-    (void)setvbuf(stdout, NULL, _IOLBF, 0);
     int status = EXIT_BAD_START;
     if (open_all(&app, &options)) {
         status = run(&app);

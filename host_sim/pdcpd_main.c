@@ -2,10 +2,11 @@
  * --can sim the bus is in this process too, and with --node its devices are. */
 #include <ctype.h>
 #include <inttypes.h>
-#include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include "arb_app.h"
 #include "hal_sys.h"
@@ -14,6 +15,7 @@
 #include "linux_uart.h"
 #include "loop.h"
 #include "node_ini.h"
+#include "pdcpd_log.h"
 #include "pdcpd_options.h"
 #include "sim_node.h"
 #include "sim_world.h"
@@ -22,11 +24,14 @@
 enum {
     RECEIVE_BATCH = 32,
     HOST_BATCH = 256,
-    STALL_US = 50000 /* a world that is called later than this was stopped */
+    PATIENCE_MS = 500, /* for the last lines to be read */
+    STALL_US = 50000   /* a world that is called later than this was stopped */
 };
 
 typedef struct {
     pdcpd_options_t options;
+    pdcpd_log_t log;
+    line_writer_t *out; /* standard output: where bus and host are, and values of --node */
     arb_app_t app;
     arb_port_t port;
     loop_t *loop;
@@ -46,108 +51,30 @@ typedef struct {
     sim_node_t *nodes[PDCPD_NODES_MAX];
 } daemon_t;
 
-/* --- log --- */
-
-static void say(const daemon_t *daemon, pdcpd_log_t level, const char *format, ...)
-    __attribute__((format(printf, 3, 4)));
-
-static void say(const daemon_t *daemon, pdcpd_log_t level, const char *format, ...)
-{
-    if (level > daemon->options.log) {
-        return;
-    }
-    va_list arguments;
-    va_start(arguments, format);
-    (void)fprintf(stderr, "pdcpd: ");
-    (void)vfprintf(stderr, format, arguments);
-    (void)fputc('\n', stderr);
-    va_end(arguments);
-}
-
-static const char *bus_state_name(int8_t state)
-{
-    static const char *const names[] = {"active", "error-passive", "bus-off", "down"};
-    return names[state];
-}
-
-static void say_link(const daemon_t *daemon, const pdcp_event_t *event)
-{
-    const pdcp_tables_t *tables = &daemon->app.arb.bus.tables;
-    const pdcp_channel_t *input = &tables->channels[event->channel];
-    const pdcp_identity_t *to = &tables->devices[input->place].identity;
-    const pdcp_identity_t *from = &input->source.identity;
-    const char *outcome = event->status == PDCP_OK ? "" : ", could not be made";
-    if (input->link == PDCP_LINK_NONE) {
-        say(daemon, PDCPD_LOG_INFO, "%u:%u:%u.%u is unlinked%s", to->vid, to->pid, to->sn, input->index,
-            outcome);
-        return;
-    }
-    say(daemon, PDCPD_LOG_INFO, "%u:%u:%u.%u -> %u:%u:%u.%u is %s%s", from->vid, from->pid, from->sn,
-        input->source.index, to->vid, to->pid, to->sn, input->index,
-        input->link == PDCP_LINK_ACTIVE ? "active" : "inactive", outcome);
-}
-
-static void say_audit(const daemon_t *daemon, const pdcp_event_t *event)
-{
-    const pdcp_tables_t *tables = &daemon->app.arb.bus.tables;
-    const pdcp_channel_t *channel = &tables->channels[event->channel];
-    const pdcp_identity_t *owner = &tables->devices[channel->place].identity;
-    say(daemon, PDCPD_LOG_WARNING, "%u:%u:%u.%u had a wrong parameter %u", owner->vid, owner->pid, owner->sn,
-        channel->index, (unsigned)event->status);
-}
-
-/* What is said of an event that needs no more than its device. */
-static const struct {
-    pdcpd_log_t level;
-    bool names_device; /* the text follows the device's name */
-    const char *text;  /* NULL: nothing is said */
-} sayings[] = {
-    [PDCP_EVENT_BOUND] = {PDCPD_LOG_INFO, true, " is there"},
-    [PDCP_EVENT_READY] = {PDCPD_LOG_INFO, true, " is set up"},
-    [PDCP_EVENT_SETUP_FAILED] = {PDCPD_LOG_WARNING, true, " could not be set up: bound but unlinked"},
-    [PDCP_EVENT_LOST] = {PDCPD_LOG_WARNING, true, " is gone"},
-    [PDCP_EVENT_REFUSED] = {PDCPD_LOG_WARNING, false, "a device was refused: no node id or no place is left"},
-    [PDCP_EVENT_DUPLICATE] = {PDCPD_LOG_WARNING, true, " exists twice: the second device was refused"},
-    [PDCP_EVENT_FOREIGN] = {PDCPD_LOG_WARNING, false,
-                            "another arbitrator is on the bus; this one was there first and stays"},
-    [PDCP_EVENT_SILENT] = {PDCPD_LOG_WARNING, false,
-                           "another arbitrator was there first: on standby, silent"},
-    [PDCP_EVENT_STARTED] = {PDCPD_LOG_WARNING, false, "the other arbitrator is gone: takes over"},
-};
-
-static void say_device(const daemon_t *daemon, const pdcp_event_t *event)
-{
-    const size_t kind = (size_t)event->kind;
-    char name[40] = "a device";
-    if (kind >= sizeof sayings / sizeof sayings[0] || sayings[kind].text == NULL) {
-        return;
-    }
-    if (event->place != PDCP_NONE) {
-        const pdcp_device_entry_t *device = &daemon->app.arb.bus.tables.devices[event->place];
-        (void)snprintf(name, sizeof name, "%u:%u:%u (id %u)", device->identity.vid, device->identity.pid,
-                       device->identity.sn, device->node_id);
-    }
-    say(daemon, sayings[kind].level, "%s%s", sayings[kind].names_device ? name : "", sayings[kind].text);
-}
+/* --- lines for people and programs --- */
 
 static void on_event(void *ctx, uint32_t now_ms, const pdcp_event_t *event)
 {
-    const daemon_t *daemon = ctx;
+    daemon_t *daemon = ctx;
     (void)now_ms;
-    switch (event->kind) {
-    case PDCP_EVENT_STATE:
-        say(daemon, PDCPD_LOG_WARNING, "bus state: %s", bus_state_name(event->status));
-        break;
-    case PDCP_EVENT_LINK:
-        say_link(daemon, event);
-        break;
-    case PDCP_EVENT_AUDIT:
-        say_audit(daemon, event);
-        break;
-    default:
-        say_device(daemon, event);
-        break;
+    pdcpd_log_event(&daemon->log, loop_now_us(daemon->loop), &daemon->app.arb.bus.tables, event);
+}
+
+static void warn(daemon_t *daemon, const char *what, unsigned damaged, int of)
+{
+    if (damaged != 0) {
+        pdcpd_log_say(&daemon->log, loop_now_us(daemon->loop), PDCPD_LOG_WARNING,
+                      "%s: %u of %d copies of the %s are damaged", daemon->options.nvm, damaged, of, what);
     }
+}
+
+/* What the storage file could not give back. */
+static void warn_of_damage(daemon_t *daemon)
+{
+    const arb_limb_t *limb = &daemon->app.limb;
+    warn(daemon, "identities", daemon->app.store.damaged, ARB_AREAS);
+    warn(daemon, "flags", limb->flags.damaged, ARB_AREAS);
+    warn(daemon, "stored configurations", (unsigned)limb->config.counters[ARB_CONFIG_DAMAGED], ARB_AREAS);
 }
 
 /* --- port of the application --- */
@@ -257,8 +184,8 @@ static void on_can_ready(void *ctx)
     arb_app_on_state(&daemon->app, now_ms, (pdcp_bus_state_t)health.state);
 }
 
-/* One turn with a bus outside. */
-static void work_outside(daemon_t *daemon)
+/* One turn with a bus outside. Returns the time of the next one at the latest. */
+static uint64_t work_outside(daemon_t *daemon)
 {
     const uint64_t now_us = loop_now_us(daemon->loop);
     const uint32_t now_ms = (uint32_t)(now_us / 1000u);
@@ -268,11 +195,11 @@ static void work_outside(daemon_t *daemon)
     const uint32_t next_ms = arb_app_step(&daemon->app, now_ms);
     const int32_t wait_ms = (int32_t)(next_ms - now_ms);
     const uint64_t tick_us = now_us / 1000u * 1000u;
-    loop_set_deadline_us(daemon->loop, wait_ms > 0 ? tick_us + (uint64_t)wait_ms * 1000u : now_us);
+    return wait_ms > 0 ? tick_us + (uint64_t)wait_ms * 1000u : now_us;
 }
 
-/* The world's time. It stands still while the process is stopped or a slow disk holds it up: programs on the bus
- * have gone on speaking meanwhile, and their frames come in only now. */
+/* The world's time. It stands still while the process is stopped: programs on the bus have gone on speaking
+ * meanwhile, and their frames come in only now (D-LIN-8). */
 static uint64_t world_now_us(daemon_t *daemon)
 {
     const uint64_t now_us = loop_now_us(daemon->loop);
@@ -282,8 +209,8 @@ static uint64_t world_now_us(daemon_t *daemon)
     return now_us - daemon->world_late_us;
 }
 
-/* One turn with the bus in this process. */
-static void work_world(daemon_t *daemon)
+/* One turn with the bus in this process. Returns the time of the next one at the latest. */
+static uint64_t work_world(daemon_t *daemon)
 {
     const uint64_t now_us = world_now_us(daemon);
     (void)sim_world_run(daemon->world, now_us);
@@ -298,7 +225,7 @@ static void work_world(daemon_t *daemon)
         again = daemon->server != NULL && socketcand_server_poll(daemon->server);
     } while (again);
     daemon->world_due_us = next_us != SIM_BUS_NEVER ? next_us + daemon->world_late_us : UINT64_MAX - STALL_US;
-    loop_set_deadline_us(daemon->loop, daemon->world_due_us);
+    return daemon->world_due_us;
 }
 
 /* --- start and end --- */
@@ -334,7 +261,7 @@ static bool open_world(daemon_t *daemon)
     if (daemon->server == NULL) {
         return complain(error);
     }
-    (void)printf("bus 127.0.0.1:%u\n", socketcand_server_port(daemon->server));
+    line_writer_put(daemon->out, "bus 127.0.0.1:%u", socketcand_server_port(daemon->server));
     return true;
 }
 
@@ -351,8 +278,9 @@ static bool open_bus(daemon_t *daemon)
 
 static void on_node_event(void *ctx, const sim_node_event_t *event)
 {
-    (void)ctx;
-    sim_node_print(stdout, event);
+    char line[SIM_NODE_LINE];
+    sim_node_format(line, event);
+    line_writer_put(((daemon_t *)ctx)->out, "%s", line);
 }
 
 static bool open_nodes(daemon_t *daemon)
@@ -364,7 +292,7 @@ static bool open_nodes(daemon_t *daemon)
             return complain(error);
         }
         const uint64_t now_us = loop_refresh_now_us(daemon->loop);
-        daemon->nodes[i] = sim_node_open(daemon->inis[i], (uint32_t)now_us + i, now_us, on_node_event, NULL,
+        daemon->nodes[i] = sim_node_open(daemon->inis[i], (uint32_t)now_us + i, now_us, on_node_event, daemon,
                                          error, sizeof error);
         if (daemon->nodes[i] == NULL) {
             return complain(error);
@@ -374,6 +302,13 @@ static bool open_nodes(daemon_t *daemon)
         }
     }
     return true;
+}
+
+static bool open_lines(daemon_t *daemon)
+{
+    daemon->out = line_writer_open(STDOUT_FILENO, "{\"lost\":", "}");
+    return (daemon->out != NULL && pdcpd_log_open(&daemon->log, daemon->options.log)) ||
+           complain("the threads for lines cannot be started");
 }
 
 static bool open_all(daemon_t *daemon)
@@ -417,14 +352,11 @@ static bool start(daemon_t *daemon)
                                                   : (uint32_t)(loop_refresh_now_us(daemon->loop) / 1000u);
     arb_app_init(&daemon->app, &daemon->port, &settings, now_ms);
     arb_app_observe(&daemon->app, on_event, daemon);
-    if (daemon->app.store.damaged != 0) {
-        say(daemon, PDCPD_LOG_WARNING, "%s: %u of %d copies of the identities are damaged",
-            daemon->options.nvm, daemon->app.store.damaged, ARB_AREAS);
-    }
+    warn_of_damage(daemon);
     if (daemon->world != NULL && !sim_world_set_app(daemon->world, &daemon->app)) {
         return complain("the simulated bus has no port left");
     }
-    (void)printf("host %s\n", linux_uart_path(daemon->uart));
+    line_writer_put(daemon->out, "host %s", linux_uart_path(daemon->uart));
     return true;
 }
 
@@ -448,6 +380,8 @@ static void close_all(daemon_t *daemon)
         loop_destroy(daemon->loop);
     }
     free(daemon->world);
+    pdcpd_log_close(&daemon->log);
+    line_writer_close(daemon->out, PATIENCE_MS);
     pdcpd_options_free(&daemon->options);
 }
 
@@ -456,11 +390,9 @@ static void run(daemon_t *daemon)
     daemon->world_due_us = loop_now_us(daemon->loop);
     daemon->uart_ready = true;
     do {
-        if (daemon->world != NULL) {
-            work_world(daemon);
-        } else {
-            work_outside(daemon);
-        }
+        const uint64_t next_us = daemon->world != NULL ? work_world(daemon) : work_outside(daemon);
+        const uint64_t log_us = pdcpd_log_step(&daemon->log, loop_now_us(daemon->loop));
+        loop_set_deadline_us(daemon->loop, log_us < next_us ? log_us : next_us);
     } while (loop_run_once(daemon->loop));
 }
 
@@ -469,10 +401,10 @@ int main(int argc, char **argv)
     static daemon_t daemon;
     int status = PDCPD_EXIT_USAGE;
     pdcpd_options_parse(&daemon.options, argc, argv);
-    (void)setvbuf(stdout, NULL, _IOLBF, 0);
-    if (open_all(&daemon) && start(&daemon)) {
+    (void)umask(S_IRWXG | S_IRWXO);
+    if (open_lines(&daemon) && open_all(&daemon) && start(&daemon)) {
         run(&daemon);
-        say(&daemon, PDCPD_LOG_INFO, "ends");
+        pdcpd_log_say(&daemon.log, loop_now_us(daemon.loop), PDCPD_LOG_INFO, "ends");
         status = EXIT_SUCCESS;
     }
     close_all(&daemon);

@@ -37,12 +37,12 @@ static void replace(char **text, const char *value)
     *text = copy;
 }
 
-static bool parse_level(const char *text, pdcpd_log_t *level)
+static bool parse_level(const char *text, pdcpd_level_t *level)
 {
     static const char *const names[] = {"error", "warning", "info", "debug"};
     for (unsigned i = 0; i < sizeof names / sizeof names[0]; i++) {
         if (strcmp(text, names[i]) == 0) {
-            *level = (pdcpd_log_t)i;
+            *level = (pdcpd_level_t)i;
             return true;
         }
     }
@@ -253,7 +253,7 @@ void pdcpd_options_parse(pdcpd_options_t *options, int argc, char **argv)
     };
     memset(options, 0, sizeof *options);
     argv[0] = program_invocation_short_name; /* what is wrong with an option is told without a path */
-    const pdcpd_log_t not_given = (pdcpd_log_t)(PDCPD_LOG_DEBUG + 1);
+    const pdcpd_level_t not_given = (pdcpd_level_t)(PDCPD_LOG_DEBUG + 1);
     options->log = not_given;
     if (argp_parse(&parser, argc, argv, 0, NULL, options) != 0) {
         exit(PDCPD_EXIT_USAGE);

@@ -7,7 +7,7 @@
 #define PDCPD_NODES_MAX 64
 #define PDCPD_EXIT_USAGE 2
 
-typedef enum { PDCPD_LOG_ERROR, PDCPD_LOG_WARNING, PDCPD_LOG_INFO, PDCPD_LOG_DEBUG } pdcpd_log_t;
+typedef enum { PDCPD_LOG_ERROR, PDCPD_LOG_WARNING, PDCPD_LOG_INFO, PDCPD_LOG_DEBUG } pdcpd_level_t;
 
 typedef struct {
     char *can;    /* BUS; every string is the options' own */
@@ -18,7 +18,7 @@ typedef struct {
     unsigned node_count;
     bool no_autoconfig;
     bool strict_crc;
-    pdcpd_log_t log;
+    pdcpd_level_t log;
 } pdcpd_options_t;
 
 /* Reads the command line, then the configuration file that it names; the command line wins. On anything

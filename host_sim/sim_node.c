@@ -1,6 +1,7 @@
 #include "sim_node.h"
 
 #include <inttypes.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -253,20 +254,23 @@ uint32_t sim_node_store_errors(const sim_node_t *node)
     return node->store_errors;
 }
 
-void sim_node_print(FILE *out, const sim_node_event_t *event)
+void sim_node_format(char line[SIM_NODE_LINE], const sim_node_event_t *event)
 {
     char raw[2 * sizeof event->raw + 1] = "";
+    char value[16] = "null";
     for (uint8_t i = 0; i < event->len; i++) {
         (void)snprintf(&raw[2u * i], 3, "%02x", event->raw[i]);
     }
-    (void)fprintf(out, "{\"t_ms\":%" PRIu64 ",\"device\":\"%u:%u:%u\",\"channel\":%u,",
-                  event->time_us / 1000u, event->identity.vid, event->identity.pid, event->identity.sn,
-                  event->channel);
+    if (event->safe || event->has_value) {
+        (void)snprintf(value, sizeof value, "%" PRId32, event->value);
+    }
+    const int n = snprintf(
+        line, SIM_NODE_LINE, "{\"t_ms\":%" PRIu64 ",\"device\":\"%u:%u:%u\",\"channel\":%u,",
+        event->time_us / 1000u, event->identity.vid, event->identity.pid, event->identity.sn, event->channel);
+    const size_t room = SIM_NODE_LINE - (size_t)n;
     if (event->safe) {
-        (void)fprintf(out, "\"safe\":true,\"value\":%" PRId32 "}\n", event->value);
-    } else if (event->has_value) {
-        (void)fprintf(out, "\"raw\":\"%s\",\"value\":%" PRId32 "}\n", raw, event->value);
+        (void)snprintf(&line[n], room, "\"safe\":true,\"value\":%s}", value);
     } else {
-        (void)fprintf(out, "\"raw\":\"%s\",\"value\":null}\n", raw);
+        (void)snprintf(&line[n], room, "\"raw\":\"%s\",\"value\":%s}", raw, value);
     }
 }

@@ -1,16 +1,15 @@
 /* A simulated device: the device role, a description and its signals. Passive, on the caller's clock in
  * microseconds, so that it runs in pdcp-node, in pdcpd and in virtual time alike.
  *
- * What a terminal input receives, and when it goes to its safe value, is handed to a function; sim_node_print
- * writes it as one JSON object a line. Writable parameters are kept in the description's state file, if it
- * names one. */
+ * What a terminal input receives, and when it goes to its safe value, is handed to a function;
+ * sim_node_format writes it as one JSON object a line. Writable parameters are kept in the description's
+ * state file, if it names one. */
 #ifndef SIM_NODE_H
 #define SIM_NODE_H
 
 #include <stdbool.h>
 #include <stddef.h>
 #include <stdint.h>
-#include <stdio.h>
 
 #include "can_frame.h"
 #include "node_ini.h"
@@ -61,10 +60,13 @@ const pdcp_device_t *sim_node_device(const sim_node_t *node);
 /* The state file could not be written, so often. */
 uint32_t sim_node_store_errors(const sim_node_t *node);
 
-/* Writes an event as one line, to be used with out as ctx of a function of the caller:
+/* Longest line of an event, with its terminator. */
+#define SIM_NODE_LINE 128
+
+/* Writes an event as one line, without its end:
  *   {"t_ms":1234,"device":"0002:0002:0006","channel":1,"raw":"f4","value":244}
  *   {"t_ms":1234,"device":"0002:0002:0006","channel":1,"safe":true,"value":0}
  * value is null when it is not known. */
-void sim_node_print(FILE *out, const sim_node_event_t *event);
+void sim_node_format(char line[SIM_NODE_LINE], const sim_node_event_t *event);
 
 #endif

@@ -74,7 +74,7 @@ class Program:
         for line in stream:
             text = line.rstrip("\n")
             with self._changed:
-                if text.startswith("{") and lines is self.lines:
+                if text.startswith("{") and lines is self.lines and '"lost"' not in text:
                     self.values.put(parse_value(text))
                 else:
                     lines.append(text)

@@ -31,7 +31,7 @@ struct line_writer {
     char bytes[LINE_WRITER_BYTES];
 };
 
-/* --- the thread --- */
+/* --- the thread, which alone waits for the reader (D-LIN-6) --- */
 
 static uint64_t lines_in(const char *bytes, size_t size)
 {

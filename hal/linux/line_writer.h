@@ -1,8 +1,8 @@
-/* Lines of text for people and other programs. Writing them never blocks the caller.
+/* Lines of text for people and other programs. Writing them never blocks the caller (D-LIN-6).
  *
- * A thread writes what waits in a buffer of LINE_WRITER_BYTES. A terminal that is stopped (Ctrl-S), a pipe that
- * nobody reads, or a slow disk holds up that thread alone. Lines that find no room are lost; when there is room
- * again, a line says how many. Call all functions from one thread. */
+ * A thread writes what waits in a buffer of LINE_WRITER_BYTES. A terminal that is stopped (Ctrl-S), a pipe
+ * that nobody reads, or a slow disk holds up that thread alone. Lines that find no room are lost; when there
+ * is room again, a line says how many. Call all functions from one thread. */
 #ifndef LINE_WRITER_H
 #define LINE_WRITER_H
 
@@ -14,8 +14,8 @@ enum { LINE_WRITER_BYTES = 256 * 1024, LINE_WRITER_LINE_MAX = 512 };
 
 typedef struct line_writer line_writer_t;
 
-/* Writes to fd, which must stay open until line_writer_close. before and after: the text around the number in the
- * line that tells of lost lines, without its end; they must outlive the writer. NULL: errno says why. */
+/* Writes to fd, which must stay open until line_writer_close. before and after: the text around the number in
+ * the line that tells of lost lines, without its end; they must outlive the writer. NULL: errno says why. */
 line_writer_t *line_writer_open(int fd, const char *before, const char *after);
 
 /* Waits up to patience_ms for what is left to be written, then throws it away. NULL: does nothing. */

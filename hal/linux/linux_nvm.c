@@ -11,8 +11,8 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-/* A disk may take half a second for a page, and the limb must not wait for it: a thread writes. It shares what
- * stands below lock. */
+/* A disk may take half a second for a page, and the limb must not wait for it: a thread writes (D-LIN-5). It
+ * shares what stands below lock. */
 struct hal_nvm {
     int fd;                      /* -1: in memory */
     uint8_t bytes[HAL_NVM_SIZE]; /* contents when in memory */

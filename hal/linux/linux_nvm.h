@@ -1,5 +1,5 @@
-/* Non-volatile memory in a file of HAL_NVM_SIZE bytes; hal_nvm.h has its functions. A thread writes, so that a slow
- * disk holds nobody up. A write is on the disk (fdatasync) before hal_nvm_status says idle. */
+/* Non-volatile memory in a file of HAL_NVM_SIZE bytes; hal_nvm.h has its functions. A thread writes, so that
+ * a slow disk holds nobody up. A write is on the disk (fdatasync) before hal_nvm_status says idle. */
 #ifndef LINUX_NVM_H
 #define LINUX_NVM_H
 
@@ -9,8 +9,8 @@
 
 /* Opens or creates the file (mode 0600, filled with FFh) and locks it, so that two daemons never share one.
  * Refused: a file of another size, a symbolic link, a file of another user (root's aside) or that others may
- * write. path NULL: memory only, forgotten at the end. NULL result: error[] holds one line that names the file
- * and the reason. The caller owns the result. */
+ * write. path NULL: memory only, forgotten at the end. NULL result: error[] holds one line that names the
+ * file and the reason. The caller owns the result. */
 hal_nvm_t *linux_nvm_open(const char *path, char *error, size_t error_size);
 
 /* Waits for the write under way. NULL: does nothing. */

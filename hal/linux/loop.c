@@ -268,8 +268,8 @@ static void dispatch_all(loop_t *loop, const struct epoll_event *events, int n)
     }
 }
 
-/* When the deadline is reached, all that came before now is handled first. The program may have been stopped
- * since the last fetch, and would take for silent whoever spoke meanwhile. */
+/* When the deadline is reached, all that came before now is handled first (D-LIN-8). The program may have
+ * been stopped since the last fetch, and would take for silent whoever spoke meanwhile. */
 bool loop_run_once(loop_t *loop)
 {
     struct epoll_event events[LOOP_EVENTS_MAX];

@@ -93,8 +93,8 @@ static bool has_ended_with_after(void)
     return len >= 6 && strcmp(&text[len - 6], "after\n") == 0;
 }
 
-/* Whoever does not read holds up nobody; when he reads again, he learns how many lines are missing, and every other
- * line is there. */
+/* Whoever does not read holds up nobody; when he reads again, he learns how many lines are missing, and every
+ * other line is there. */
 static void test_a_pipe_that_nobody_reads(void)
 {
     open_writer(ends[1]);

@@ -275,8 +275,8 @@ static void stop_parent(uint64_t deadline_us)
     _exit(write(pipe_a[1], "x", 1) == 1 && kill(parent, SIGCONT) == 0 ? 0 : 1);
 }
 
-/* A program that was stopped (Ctrl-Z, a debugger) finds its deadline passed and bytes that came before: it
- * hears them before it judges who was silent. */
+/* D-LIN-8: a program that was stopped (Ctrl-Z, a debugger) finds its deadline passed and bytes that came
+ * before: it hears them before it judges who was silent. */
 static void test_what_came_while_it_was_stopped_is_handled_before_the_deadline(void)
 {
     int status;

@@ -233,6 +233,7 @@ int __wrap_fdatasync(int fd)
     return __real_fdatasync(fd);
 }
 
+/* D-LIN-5 */
 static void test_a_slow_disk_holds_nobody_up(void)
 {
     uint8_t byte;

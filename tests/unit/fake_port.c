@@ -102,7 +102,10 @@ static int8_t nvm_status(void *ctx)
         fake->polls_left--;
         return 1;
     }
-    return fake->fails ? (int8_t)-1 : fake->status;
+    if (fake->fails) {
+        return -1;
+    }
+    return fake->status;
 }
 
 void fake_port_init(fake_port_t *fake, const fake_region_t *regions, uint8_t region_count)

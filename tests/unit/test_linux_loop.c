@@ -256,7 +256,9 @@ static void await_state(pid_t pid, char state)
             _exit(1);
         }
         const char *behind_name = fgets(text, sizeof text, file) != NULL ? strrchr(text, ')') : NULL;
-        now = behind_name != NULL ? behind_name[2] : '?';
+        if (behind_name != NULL) {
+            now = behind_name[2];
+        }
         (void)fclose(file);
     }
 }

@@ -220,6 +220,7 @@ static sem_t disk;
 static bool disk_is_held;
 static pthread_t caller; /* the thread of the tests */
 
+/* NOLINTBEGIN(bugprone-reserved-identifier): the linker's names */
 int __real_fdatasync(int fd);
 int __wrap_fdatasync(int fd);
 
@@ -232,6 +233,7 @@ int __wrap_fdatasync(int fd)
     }
     return __real_fdatasync(fd);
 }
+/* NOLINTEND(bugprone-reserved-identifier) */
 
 /* D-LIN-5 */
 static void test_a_slow_disk_holds_nobody_up(void)

@@ -10,7 +10,8 @@
 
 enum { SECOND_US = 1000000, PATIENCE_MS = 500 };
 
-/* Does standard error lead to the journal, which knows the time? It says so by JOURNAL_STREAM=DEVICE:INODE. */
+/* Does standard error lead to the journal, which knows the time? It says so by
+ * JOURNAL_STREAM=DEVICE:INODE. */
 static bool is_journal(void)
 {
     struct stat status;

@@ -1,7 +1,7 @@
 /* The log of pdcpd: what happens on the bus, for the person who runs it, on standard error.
  *
- * It never blocks (line_writer.h). Of one kind of event it says PDCPD_LOG_RATE lines a second; the others are counted
- * and told when the second is over. Each line begins with the time, unless a journal adds it. */
+ * It never blocks (line_writer.h). Of one kind of event it says PDCPD_LOG_RATE lines a second; the others are
+ * counted and told when the second is over. Each line begins with the time, unless a journal adds it. */
 #ifndef PDCPD_LOG_H
 #define PDCPD_LOG_H
 

@@ -2,9 +2,10 @@
  *
  * PORT is one of
  *
- *   pty, pty:LINKPATH       a new pseudo-terminal in raw mode; with LINKPATH a symbolic link to it is made,
- *                           replacing a stale one (to a terminal that does not exist any more), and removed
- *                           at the end. Nothing else is ever replaced
+ *   pty, pty:LINKPATH       a new pseudo-terminal in raw mode; with LINKPATH a symbolic link to it is made and
+ *                           removed at the end. LINKPATH.lock is locked as long as the link is ours. A link
+ *                           that a crash has left is replaced: its lock is free, or it leads nowhere. Nothing
+ *                           else is ever replaced (D-LIN-4)
  *   serial:DEVICE[@BAUD]    a serial line, raw, 8N1, for this program alone; any rate that the driver can
  *                           make, 128000 when none is given. While its adapter is pulled out there is no host
  *

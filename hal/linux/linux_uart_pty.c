@@ -5,6 +5,7 @@
  * and again. */
 #include <errno.h>
 #include <fcntl.h>
+#include <limits.h>
 #include <poll.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -16,6 +17,7 @@
 #include <unistd.h>
 
 #include "linux_uart_backend.h"
+#include "path_lock.h"
 
 #define PATH_BYTES 64 /* /dev/pts/N */
 #define WATCH_BYTES (EPOLLIN | EPOLLET)
@@ -28,7 +30,8 @@ typedef struct {
     bool awaiting_room; /* EPOLLOUT is watched */
     bool used;          /* bytes were exchanged since the host's end was made fresh */
     char path[PATH_BYTES];
-    char *link; /* NULL: none */
+    char *link;       /* NULL: none */
+    path_lock_t lock; /* beside the link */
 } pty_t;
 
 /* Makes the host's end as a new host expects it: raw, and without bytes that the last one left unread. Not
@@ -118,13 +121,28 @@ static const char *pty_path(const hal_uart_t *uart)
     return ((const pty_t *)uart)->path;
 }
 
-/* A link to a terminal that exists is somebody's: a second program must not take a running one's host
- * away. */
-static bool is_stale_link(const char *path)
+/* May a link that stands here already be removed? had_lock: a lock stood beside it, which nobody holds any
+ * more, so whoever made it has crashed. Without a lock it is another program's, unless it leads nowhere. */
+static bool is_left_over(const char *path, bool had_lock)
 {
     struct stat status;
-    return lstat(path, &status) == 0 && S_ISLNK(status.st_mode) && stat(path, &status) != 0 &&
-           errno == ENOENT;
+    if (lstat(path, &status) != 0 || !S_ISLNK(status.st_mode)) {
+        return false;
+    }
+    return had_lock || (stat(path, &status) != 0 && errno == ENOENT);
+}
+
+/* Becomes the owner of the link's place. */
+static bool take_place(pty_t *pty, const char *link)
+{
+    char lock[PATH_MAX];
+    struct stat status;
+    (void)snprintf(lock, sizeof lock, "%s.lock", link);
+    const bool had_lock = lstat(lock, &status) == 0;
+    if (!path_lock_take(&pty->lock, link)) {
+        return false;
+    }
+    return !is_left_over(link, had_lock) || unlink(link) == 0;
 }
 
 static bool make_link(pty_t *pty, const char *link)
@@ -165,7 +183,7 @@ static bool open_pty(pty_t *pty)
  * names. */
 static bool open_all(pty_t *pty, const char *link)
 {
-    if (link != NULL && is_stale_link(link) && unlink(link) != 0) {
+    if (link != NULL && !take_place(pty, link)) {
         return false;
     }
     return open_pty(pty) && (link == NULL || make_link(pty, link)) &&
@@ -178,6 +196,7 @@ static void pty_close(hal_uart_t *uart)
     if (pty->link != NULL) {
         remove_link(pty);
     }
+    path_lock_give(&pty->lock);
     if (pty->fd >= 0) {
         loop_remove(uart->loop, pty->fd);
         close(pty->fd);
@@ -189,6 +208,9 @@ static void pty_close(hal_uart_t *uart)
 static const char *reason_of(const char *link)
 {
     struct stat status;
+    if (errno == EWOULDBLOCK) {
+        return "is in use by another program";
+    }
     if (errno != EEXIST || lstat(link, &status) != 0) {
         return strerror(errno);
     }
@@ -205,6 +227,7 @@ static hal_uart_t *pty_open(const linux_uart_request_t *request)
     }
     linux_uart_backend_init(&pty->uart, &linux_uart_pty_backend, request);
     pty->fd = -1;
+    pty->lock.fd = -1;
     if (!open_all(pty, request->address)) {
         linux_uart_backend_refuse(request, reason_of(request->address));
         pty_close(&pty->uart);

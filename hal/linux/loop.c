@@ -61,11 +61,20 @@ static void on_signal(void *ctx, uint32_t events)
     }
 }
 
+static bool is_ignored(int number)
+{
+    struct sigaction action;
+    return sigaction(number, NULL, &action) == 0 && action.sa_handler == SIG_IGN;
+}
+
 static bool block_signals(loop_t *loop, sigset_t *signals)
 {
     sigemptyset(signals);
     sigaddset(signals, SIGTERM);
     sigaddset(signals, SIGINT);
+    if (!is_ignored(SIGHUP)) { /* nohup has it ignored */
+        sigaddset(signals, SIGHUP);
+    }
     if (sigprocmask(SIG_BLOCK, signals, &loop->signals_before) != 0) {
         return false;
     }

@@ -1,5 +1,6 @@
 /* The one event loop of a Linux program: epoll for descriptors, a timerfd for the next deadline, a signalfd
- * for SIGTERM and SIGINT. A program that has nothing to do sleeps in epoll_wait and uses no processor time.
+ * for SIGTERM, SIGINT and SIGHUP. A program that has nothing to do sleeps in epoll_wait and uses no processor
+ * time.
  *
  * Single-threaded. Handlers run inside loop_run_once and may call every function of this header, loop_remove
  * for their own or another descriptor included. */
@@ -14,8 +15,9 @@ typedef struct loop loop_t;
 /* events: the EPOLLIN, EPOLLOUT, EPOLLERR and EPOLLHUP bits that are set. */
 typedef void (*loop_handler_t)(void *ctx, uint32_t events);
 
-/* NULL when the kernel refuses one of the descriptors; errno says why. SIGTERM and SIGINT are blocked and
- * taken by the loop from here on, SIGPIPE is ignored. The caller owns the loop. */
+/* NULL when the kernel refuses one of the descriptors; errno says why. SIGTERM, SIGINT and SIGHUP are
+ * blocked and taken by the loop from here on (SIGHUP not if it is ignored, as nohup does it); SIGPIPE is
+ * ignored. The caller owns the loop. */
 loop_t *loop_create(void);
 void loop_destroy(loop_t *loop);
 
@@ -40,7 +42,7 @@ uint64_t loop_refresh_now_us(loop_t *loop);
 void loop_set_deadline_us(loop_t *loop, uint64_t deadline_us);
 
 /* Sleeps until a descriptor is ready, the deadline is reached or a signal came, and runs the handlers. When
- * the deadline is reached, everything that had come by then has been handled. False: SIGTERM or SIGINT came,
+ * the deadline is reached, everything that had come by then has been handled. False: one of the signals came,
  * or loop_stop was called: the program should end. */
 bool loop_run_once(loop_t *loop);
 void loop_stop(loop_t *loop);

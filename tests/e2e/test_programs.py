@@ -1,6 +1,7 @@
 """pdcpd and pdcp-node as programs: how they begin, complain and end."""
 
 import re
+import signal
 import socket
 import subprocess
 from collections.abc import Callable
@@ -10,7 +11,7 @@ import pytest
 from programs import END_TIMEOUT_S, Pdcpd, until
 from rawhost import RawHost
 
-from pdcp import ChannelId, Client, Identity, Link, LinkStatus
+from pdcp import ChannelId, Client, ConnectionFailedError, Identity, Link, LinkStatus
 
 Start = Callable[..., Pdcpd]
 Connect = Callable[[Pdcpd], RawHost]
@@ -178,6 +179,36 @@ def test_a_stale_link_is_replaced(start: Start, tmp_path: Path) -> None:
     assert str(link.readlink()) == path
     with Client(str(link)) as host:
         assert host.system_info() == (0, 0, 0, 0)
+
+
+def test_a_link_that_a_crash_has_left_leads_to_nobody_else(start: Start, tmp_path: Path) -> None:
+    """D-LIN-4: the number of its terminal may be another daemon's by now. A command for one limb must not reach
+    another."""
+    left, right = tmp_path / "left", tmp_path / "right"
+    crashed = start("--host", f"pty:{left}")
+    crashed.port()
+    crashed.kill()
+    other = start("--host", f"pty:{right}")
+    left.unlink()
+    left.symlink_to(other.port())  # as it is when the number is taken again
+    with pytest.raises(ConnectionFailedError, match=f"{left}: its daemon has ended"):
+        Client(str(left))
+    with Client(str(right)) as host:
+        assert host.system_info() == (0, 0, 0, 0)
+    path = start("--host", f"pty:{left}").port()
+    assert str(left.readlink()) == path
+    with Client(str(left)) as host:
+        assert host.system_info() == (0, 0, 0, 0)
+
+
+def test_a_terminal_that_closes_ends_the_daemon(start: Start, tmp_path: Path) -> None:
+    """SIGHUP is a clean end: nothing is left behind."""
+    link = tmp_path / "arbitrator"
+    pdcpd = start("--host", f"pty:{link}")
+    pdcpd.port()
+    pdcpd.process.send_signal(signal.SIGHUP)
+    assert pdcpd.wait() == 0
+    assert list(tmp_path.glob("arbitrator*")) == []
 
 
 def test_two_with_the_same_link(start: Start, run: Run, tmp_path: Path) -> None:

@@ -191,10 +191,10 @@ static void test_later_deadline_costs_one_empty_round(void)
     TEST_ASSERT_EQUAL_INT(2, rounds_until(start_us + 30000));
 }
 
-static void test_sigterm_and_sigint_end_the_program(void)
+static void test_signals_end_the_program(void)
 {
-    const int signals[] = {SIGTERM, SIGINT};
-    for (size_t i = 0; i < 2; i++) {
+    const int signals[] = {SIGTERM, SIGINT, SIGHUP};
+    for (size_t i = 0; i < 3; i++) {
         loop_destroy(loop);
         loop = loop_create();
         round_now();
@@ -203,6 +203,16 @@ static void test_sigterm_and_sigint_end_the_program(void)
         TEST_ASSERT_FALSE(loop_run_once(loop));
         TEST_ASSERT_FALSE(loop_run_once(loop));
     }
+}
+
+static void test_a_signal_that_nohup_ignores_stays_ignored(void)
+{
+    loop_destroy(loop);
+    TEST_ASSERT_TRUE(signal(SIGHUP, SIG_IGN) != SIG_ERR);
+    loop = loop_create();
+    TEST_ASSERT_EQUAL_INT(0, raise(SIGHUP));
+    round_now();
+    TEST_ASSERT_TRUE(signal(SIGHUP, SIG_DFL) != SIG_ERR);
 }
 
 static void stop_loop(void *ctx, uint32_t events)
@@ -327,7 +337,8 @@ int main(void)
     RUN_TEST(test_sleeps_until_the_deadline_and_not_longer);
     RUN_TEST(test_earlier_deadline_replaces_the_armed_one);
     RUN_TEST(test_later_deadline_costs_one_empty_round);
-    RUN_TEST(test_sigterm_and_sigint_end_the_program);
+    RUN_TEST(test_signals_end_the_program);
+    RUN_TEST(test_a_signal_that_nohup_ignores_stays_ignored);
     RUN_TEST(test_stop_ends_the_round_after_the_other_handlers);
     RUN_TEST(test_sigpipe_is_ignored);
     RUN_TEST(test_what_came_while_it_was_stopped_is_handled_before_the_deadline);

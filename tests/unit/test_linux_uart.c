@@ -19,6 +19,7 @@
 
 static char folder[] = "/tmp/test_linux_uart.XXXXXX";
 static char link_path[64];
+static char lock_path[72];
 static char error[200];
 static loop_t *loop;
 static hal_uart_t *uart;
@@ -48,6 +49,7 @@ void setUp(void)
     memset(folder + strlen(folder) - 6, 'X', 6);
     TEST_ASSERT_NOT_NULL(mkdtemp(folder));
     snprintf(link_path, sizeof link_path, "%s/pty", folder);
+    snprintf(lock_path, sizeof lock_path, "%s.lock", link_path);
     loop = loop_create();
     uart = NULL;
     received_n = 0;
@@ -60,6 +62,7 @@ void tearDown(void)
     linux_uart_close(uart);
     loop_destroy(loop);
     unlink(link_path);
+    unlink(lock_path);
     rmdir(folder);
 }
 
@@ -385,6 +388,12 @@ static bool link_exists(void)
     return lstat(link_path, &status) == 0;
 }
 
+static bool lock_exists(void)
+{
+    struct stat status;
+    return lstat(lock_path, &status) == 0;
+}
+
 static void test_link_is_made_and_removed(void)
 {
     open_linked();
@@ -412,9 +421,46 @@ static void test_link_of_a_running_program_is_left(void)
     open_linked();
     snprintf(port, sizeof port, "pty:%s", link_path);
     TEST_ASSERT_NULL(linux_uart_open(loop, port, on_ready, NULL, error, sizeof error));
-    snprintf(expected, sizeof expected, "%s: is in use: it leads to a terminal that exists", port);
+    snprintf(expected, sizeof expected, "%s: is in use by another program", port);
     TEST_ASSERT_EQUAL_STRING(expected, error);
     expect_link_to_us();
+}
+
+/* A program that locks nothing, such as an older daemon or socat, keeps its link as long as that leads
+ * somewhere. */
+static void test_link_of_a_program_without_a_lock_is_left(void)
+{
+    char port[80];
+    char expected[200];
+    TEST_ASSERT_EQUAL_INT(0, symlink("/dev/null", link_path));
+    snprintf(port, sizeof port, "pty:%s", link_path);
+    TEST_ASSERT_NULL(linux_uart_open(loop, port, on_ready, NULL, error, sizeof error));
+    snprintf(expected, sizeof expected, "%s: is in use: it leads to a terminal that exists", port);
+    TEST_ASSERT_EQUAL_STRING(expected, error);
+    TEST_ASSERT_TRUE(link_exists());
+    TEST_ASSERT_FALSE(lock_exists());
+}
+
+/* D-LIN-4: after a crash the link may lead into somebody's terminal. Its lock is free: it is taken over. */
+static void test_link_with_a_free_lock_is_taken_over(void)
+{
+    TEST_ASSERT_EQUAL_INT(0, symlink("/dev/null", link_path));
+    (void)close(open(lock_path, O_RDWR | O_CREAT, 0600));
+    open_linked();
+    expect_link_to_us();
+    close_uart();
+    TEST_ASSERT_FALSE(link_exists());
+    TEST_ASSERT_FALSE(lock_exists());
+}
+
+static void test_a_lock_that_is_a_link_is_not_followed(void)
+{
+    char port[80];
+    TEST_ASSERT_EQUAL_INT(0, symlink("/dev/null", lock_path));
+    snprintf(port, sizeof port, "pty:%s", link_path);
+    TEST_ASSERT_NULL(linux_uart_open(loop, port, on_ready, NULL, error, sizeof error));
+    TEST_ASSERT_FALSE(link_exists());
+    TEST_ASSERT_EQUAL_INT(0, unlink(lock_path));
 }
 
 /* What a program that was killed leaves behind: its terminal's number may be the new one's. */
@@ -494,6 +540,9 @@ int main(void)
     RUN_TEST(test_stale_link_is_replaced);
     RUN_TEST(test_link_of_a_running_program_is_left);
     RUN_TEST(test_link_to_the_number_of_the_new_terminal_is_stale);
+    RUN_TEST(test_link_of_a_program_without_a_lock_is_left);
+    RUN_TEST(test_link_with_a_free_lock_is_taken_over);
+    RUN_TEST(test_a_lock_that_is_a_link_is_not_followed);
     RUN_TEST(test_a_host_that_has_left_is_told_once);
     RUN_TEST(test_link_that_now_belongs_to_another_is_left);
     RUN_TEST(test_file_in_the_place_of_the_link_is_an_error_and_left);

@@ -86,8 +86,8 @@ static void test_a_level_that_is_not_wanted_is_not_told(void)
     TEST_ASSERT_EQUAL_STRING("pdcpd: enough\n", close_log());
 }
 
-/* 20 lines of one kind a second; then how many there were more, when the second is over. Another kind is told all
- * the same. */
+/* 20 lines of one kind a second; then how many there were more, when the second is over. Another kind is told
+ * all the same. */
 static void test_a_flood_of_one_kind_is_summed_up(void)
 {
     open_log_without_time();

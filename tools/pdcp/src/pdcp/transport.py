@@ -1,8 +1,10 @@
 """The line to the arbitrator."""
 
 import errno
+import fcntl
 import os
 import time
+from pathlib import Path
 from typing import Protocol
 
 import serial
@@ -37,11 +39,27 @@ def _reason(port: str, error: Exception) -> str:
     return os.strerror(number) if number is not None else str(error).replace(f"{port}: ", "")
 
 
+def _is_left_over(port: str) -> bool:
+    """Is this the link of a daemon that has ended without removing it? It may lead to another daemon by now, or into
+    somebody's terminal: its owner has PORT.lock locked, as long as it runs (D-LIN-4)."""
+    lock = Path(f"{port}.lock")
+    if not Path(port).is_symlink() or not lock.is_file():
+        return False
+    try:
+        with lock.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)
+            return True
+    except OSError:  # somebody holds it, or it is not for this user to know
+        return False
+
+
 class SerialTransport:
     """A serial port or pseudo-terminal, for this program alone; or anything else that pyserial has a URL for."""
 
     def __init__(self, port: str, baud: int = BAUD) -> None:
         self.port = port
+        if _is_left_over(port):
+            raise ConnectionFailedError(f"cannot open {port}: its daemon has ended without removing this link")
         try:
             # Fixed time-out: pyserial sets the whole port up again for a new one, baud rate included. Opening also
             # drops what was sent to a host before this one.

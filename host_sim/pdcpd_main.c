@@ -142,8 +142,11 @@ static void on_server_changed(void *ctx)
     (void)ctx; /* the world runs after every turn of the loop */
 }
 
-static void take_host_bytes(daemon_t *daemon, uint32_t now_ms)
+/* Hands bytes of the host to the application until there are no more, or it takes no more: then the host does not
+ * read its answers. True: it has taken some. */
+static bool take_host_bytes(daemon_t *daemon, uint32_t now_ms)
 {
+    bool any = false;
     if (linux_uart_host_left(daemon->uart)) {
         arb_app_on_host_gone(&daemon->app);
     }
@@ -153,14 +156,15 @@ static void take_host_bytes(daemon_t *daemon, uint32_t now_ms)
         }
         if (daemon->host_count == 0) {
             daemon->uart_ready = false;
-            return;
+            return any;
         }
         const uint16_t taken =
             arb_app_on_bytes(&daemon->app, now_ms, daemon->host_bytes, (uint16_t)daemon->host_count);
         daemon->host_count -= taken;
         memmove(daemon->host_bytes, &daemon->host_bytes[taken], daemon->host_count);
+        any = any || taken != 0;
         if (daemon->host_count != 0) {
-            return; /* the host does not read its answers: the rest waits */
+            return any;
         }
     }
 }
@@ -189,10 +193,12 @@ static uint64_t work_outside(daemon_t *daemon)
 {
     const uint64_t now_us = loop_now_us(daemon->loop);
     const uint32_t now_ms = (uint32_t)(now_us / 1000u);
-    if (daemon->uart_ready) {
-        take_host_bytes(daemon, now_ms);
-    }
-    const uint32_t next_ms = arb_app_step(&daemon->app, now_ms);
+    uint32_t next_ms;
+    bool again;
+    do { /* a step makes room for more of the host's bytes */
+        again = daemon->uart_ready && take_host_bytes(daemon, now_ms);
+        next_ms = arb_app_step(&daemon->app, now_ms);
+    } while (again && daemon->uart_ready);
     const int32_t wait_ms = (int32_t)(next_ms - now_ms);
     const uint64_t tick_us = now_us / 1000u * 1000u;
     return wait_ms > 0 ? tick_us + (uint64_t)wait_ms * 1000u : now_us;
@@ -214,15 +220,16 @@ static uint64_t work_world(daemon_t *daemon)
 {
     const uint64_t now_us = world_now_us(daemon);
     (void)sim_world_run(daemon->world, now_us);
-    if (daemon->uart_ready) {
-        take_host_bytes(daemon, sim_world_ms(daemon->world));
-        sim_world_touch_app(daemon->world);
-    }
     uint64_t next_us;
     bool again;
     do {
+        again = daemon->uart_ready && take_host_bytes(daemon, sim_world_ms(daemon->world));
+        if (again) {
+            sim_world_touch_app(daemon->world);
+        }
         next_us = sim_world_run(daemon->world, now_us);
-        again = daemon->server != NULL && socketcand_server_poll(daemon->server);
+        again = (again && daemon->uart_ready) ||
+                (daemon->server != NULL && socketcand_server_poll(daemon->server));
     } while (again);
     daemon->world_due_us = next_us != SIM_BUS_NEVER ? next_us + daemon->world_late_us : UINT64_MAX - STALL_US;
     return daemon->world_due_us;

@@ -21,8 +21,8 @@
 #include "hal_uart.h"
 #include "loop.h"
 
-/* Called from the loop when bytes may be waiting (take them until hal_uart_read gives 0) or when there is
- * room to write again. */
+/* Called from the loop when bytes may be waiting, or when there is room to write again. Take bytes until
+ * hal_uart_read gives 0, now or later: those that are left are not told of again. */
 typedef void (*linux_uart_ready_t)(void *ctx);
 
 /* NULL: error[] holds one line that names the port and the reason. The caller owns the result and closes it

@@ -81,9 +81,6 @@ static void on_event(void *ctx, uint32_t events)
             make_fresh(pty);
         }
     }
-    if (!pty->drained) {
-        loop_modify(pty->uart.loop, pty->fd, pty->awaiting_room ? WATCH_ROOM : WATCH_BYTES);
-    }
 }
 
 static size_t pty_read(hal_uart_t *uart, uint8_t *bytes, size_t size)

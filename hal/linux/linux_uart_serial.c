@@ -108,8 +108,6 @@ static void on_event(void *ctx, uint32_t events)
     serial->uart.ready(serial->uart.ctx);
     if (serial->fd >= 0 && (events & (EPOLLHUP | EPOLLERR)) != 0) {
         lose_line(serial);
-    } else if (serial->fd >= 0 && !serial->drained) {
-        loop_modify(serial->uart.loop, serial->fd, EPOLLIN | EPOLLET);
     }
 }
 

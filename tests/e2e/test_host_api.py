@@ -4,11 +4,15 @@ Requests and answers are whole messages, laid out by hand from the source's tabl
 crcmod, by the polynomials of D-API-1.
 """
 
+import os
+import select
+import time
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
-from programs import Pdcpd, until
+from programs import LINE_TIMEOUT_S, Pdcpd, until
 from rawhost import RawHost
 
 from pdcp import ChannelId, Identity, Link, LinkStatus
@@ -19,6 +23,10 @@ D3_DESCRIPTOR = "02 00 02 00 06 00 00 07"
 SYSTEM_INFO = "FE 19 01 22 5A 23 00 00"
 SYSTEM_INFO_OF_LIMB = "FE 19 02 22 5A FB 06 00 03 04 04 00 18 0F"
 GROUP_HOST = 1  # of the statistics
+FULL_S = 0.5  # without taking a byte: the line and what is behind it are full
+WATCHED_S = 2.0
+IDLE_TICKS = 10  # of 200; a daemon that spins uses most of them
+MESSAGE_MIN = 11  # a failure answer
 
 Start = Callable[..., Pdcpd]
 Connect = Callable[[Pdcpd], RawHost]
@@ -301,6 +309,36 @@ def ready(connect: Connect) -> Callable[[Pdcpd], RawHost]:
         return host
 
     return connect_when_ready
+
+
+def processor_ticks(pid: int) -> int:
+    """User and system time of a process, in hundredths of a second."""
+    fields = Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
+    return int(fields[11]) + int(fields[12])
+
+
+def test_a_host_that_never_reads_costs_no_processor_time(start: Start) -> None:
+    """It asks until nobody takes its requests any more. The daemon sleeps; when the host reads, all is answered."""
+    pdcpd = start()
+    request = encode(0x2201, 1, b"")
+    host = os.open(pdcpd.port(), os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+    try:
+        sent = 0
+        waiting_s = time.monotonic()
+        while time.monotonic() - waiting_s < FULL_S:
+            with suppress(BlockingIOError):
+                sent += os.write(host, request)
+                waiting_s = time.monotonic()
+        before = processor_ticks(pdcpd.process.pid)
+        time.sleep(WATCHED_S)
+        assert processor_ticks(pdcpd.process.pid) - before <= IDLE_TICKS
+        answers = b""
+        while len(answers) < sent // len(request) * MESSAGE_MIN:
+            if select.select([host], [], [], LINE_TIMEOUT_S)[0] == []:
+                pytest.fail(f"{len(answers)} bytes of answers for {sent} bytes of requests")
+            answers += os.read(host, 4096)
+    finally:
+        os.close(host)
 
 
 def test_checksums_have_their_check_values() -> None:

@@ -23,6 +23,7 @@ enum {
     RECEIVE_BATCH = 32,
     FILTERS_MAX = 256,
     EXIT_BAD_START = 2,
+    EXIT_MISSING = 3,  /* the bus is not there now */
     PATIENCE_MS = 500, /* for the last lines to be read */
     OPTION_SEED = 's',
     OPTION_STATS = 1,
@@ -39,6 +40,7 @@ typedef struct {
 } options_t;
 
 typedef struct {
+    int status;         /* to end with */
     line_writer_t *out; /* standard output: what inputs receive */
     loop_t *loop;
     hal_can_t *can;
@@ -275,6 +277,7 @@ static bool open_all(app_t *app, const options_t *options)
     }
     app->can = linux_can_open(app->loop, options->bus, on_ready, app, error, sizeof error);
     if (app->can == NULL) {
+        app->status = linux_can_is_bus(options->bus) ? EXIT_MISSING : EXIT_BAD_START;
         return complain(error);
     }
     for (size_t i = 0; i < options->file_count; i++) {
@@ -359,13 +362,13 @@ int main(int argc, char **argv)
     if (argp_parse(&parser, argc, argv, 0, NULL, &options) != 0) {
         return EXIT_BAD_START;
     }
-    int status = EXIT_BAD_START;
+    app.status = EXIT_BAD_START;
     if (open_all(&app, &options)) {
-        status = run(&app);
+        app.status = run(&app);
         if (options.stats) {
             print_stats(&app);
         }
     }
     close_all(&app);
-    return status;
+    return app.status;
 }

@@ -30,6 +30,7 @@ enum {
 
 typedef struct {
     pdcpd_options_t options;
+    int status; /* to end with */
     pdcpd_log_t log;
     line_writer_t *out; /* standard output: where bus and host are, and values of --node */
     arb_app_t app;
@@ -243,6 +244,13 @@ static bool complain(const char *error)
     return false;
 }
 
+/* What cannot be opened is not there now, if its name can be right. */
+static bool complain_of(daemon_t *daemon, bool can_be_right, const char *error)
+{
+    daemon->status = can_be_right ? PDCPD_EXIT_MISSING : PDCPD_EXIT_USAGE;
+    return complain(error);
+}
+
 /* sim or sim:PORT. */
 static bool open_world(daemon_t *daemon)
 {
@@ -266,7 +274,7 @@ static bool open_world(daemon_t *daemon)
     daemon->server = socketcand_server_open(daemon->loop, &daemon->world->bus, (uint16_t)number,
                                             on_server_changed, daemon, error, sizeof error);
     if (daemon->server == NULL) {
-        return complain(error);
+        return complain_of(daemon, true, error);
     }
     line_writer_put(daemon->out, "bus 127.0.0.1:%u", socketcand_server_port(daemon->server));
     return true;
@@ -280,7 +288,7 @@ static bool open_bus(daemon_t *daemon)
     }
     daemon->can =
         linux_can_open(daemon->loop, daemon->options.can, on_can_ready, daemon, error, sizeof error);
-    return daemon->can != NULL || complain(error);
+    return daemon->can != NULL || complain_of(daemon, linux_can_is_bus(daemon->options.can), error);
 }
 
 static void on_node_event(void *ctx, const sim_node_event_t *event)
@@ -328,7 +336,7 @@ static bool open_all(daemon_t *daemon)
     daemon->uart =
         linux_uart_open(daemon->loop, daemon->options.host, on_uart_ready, daemon, error, sizeof error);
     if (daemon->uart == NULL) {
-        return complain(error);
+        return complain_of(daemon, linux_uart_is_port(daemon->options.host), error);
     }
     if (!open_bus(daemon)) {
         return false;
@@ -406,14 +414,14 @@ static void run(daemon_t *daemon)
 int main(int argc, char **argv)
 {
     static daemon_t daemon;
-    int status = PDCPD_EXIT_USAGE;
     pdcpd_options_parse(&daemon.options, argc, argv);
+    daemon.status = PDCPD_EXIT_USAGE;
     (void)umask(S_IRWXG | S_IRWXO);
     if (open_lines(&daemon) && open_all(&daemon) && start(&daemon)) {
         run(&daemon);
         pdcpd_log_say(&daemon.log, loop_now_us(daemon.loop), PDCPD_LOG_INFO, "ends");
-        status = EXIT_SUCCESS;
+        daemon.status = EXIT_SUCCESS;
     }
     close_all(&daemon);
-    return status;
+    return daemon.status;
 }

@@ -6,6 +6,7 @@
 
 #define PDCPD_NODES_MAX 64
 #define PDCPD_EXIT_USAGE 2
+#define PDCPD_EXIT_MISSING 3 /* something outside is missing now: a service manager may try again */
 
 typedef enum { PDCPD_LOG_ERROR, PDCPD_LOG_WARNING, PDCPD_LOG_INFO, PDCPD_LOG_DEBUG } pdcpd_level_t;
 

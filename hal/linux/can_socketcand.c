@@ -410,6 +410,13 @@ static const char *take_address(can_socketcand_t *can, const char *address)
     return failure == 0 ? NULL : gai_strerror(failure);
 }
 
+static bool is_address(const char *address)
+{
+    const char *slash = strchr(address, '/');
+    const char *colon = slash == NULL ? NULL : memrchr(address, ':', (size_t)(slash - address));
+    return colon != NULL && colon > address && colon + 1 < slash && slash[1] != '\0';
+}
+
 /* Waits for the next step of the handshake. False: the time is over. */
 static bool wait_for_step(can_socketcand_t *can, uint64_t limit_us)
 {
@@ -480,6 +487,7 @@ static hal_can_t *can_socketcand_open(const linux_can_request_t *request)
 }
 
 const linux_can_backend_t can_socketcand_backend = {.kind = "socketcand",
+                                                    .is_address = is_address,
                                                     .open = can_socketcand_open,
                                                     .close = can_socketcand_close,
                                                     .send = can_socketcand_send,

@@ -24,6 +24,17 @@ static const char *address_in(const char *bus, const linux_can_backend_t *backen
     return backend->address_optional && (rest[0] == '\0' || rest[0] == '/') ? rest : NULL;
 }
 
+bool linux_can_is_bus(const char *bus)
+{
+    for (size_t i = 0; i < BACKENDS; i++) {
+        const char *address = address_in(bus, backends[i]);
+        if (address != NULL) {
+            return backends[i]->is_address == NULL || backends[i]->is_address(address);
+        }
+    }
+    return false;
+}
+
 hal_can_t *linux_can_open(loop_t *loop, const char *bus, linux_can_ready_t ready, void *ctx, char *error,
                           size_t error_size)
 {

@@ -30,6 +30,9 @@
  * send again after a refusal, or when the health has changed. May call every function of hal_can.h. */
 typedef void (*linux_can_ready_t)(void *ctx);
 
+/* Can BUS be right? If so, and it cannot be opened, something outside is missing now. */
+bool linux_can_is_bus(const char *bus);
+
 /* Opens BUS. An interface must be there but may be down; the first connection to a server is waited for, and
  * so is the start of an adapter, which must be plugged in, 2 s at the most. Accepted frames of hal_can_send
  * wait in the kernel, a few at a time. What a server sends that is no frame, or reports as not sent, is

@@ -29,6 +29,7 @@ typedef struct {
 typedef struct {
     const char *kind;
     bool address_optional; /* BUS may be the kind alone, or the kind and a slash with more */
+    bool (*is_address)(const char *address); /* can it be right? NULL: any can */
     hal_can_t *(*open)(const linux_can_request_t *request);
     void (*close)(hal_can_t *can);
     bool (*send)(hal_can_t *can, const can_frame_t *frame);

@@ -19,6 +19,17 @@ static bool names(const char *port, const linux_uart_backend_t *backend)
     return port[length] == ':' ? port[length + 1] != '\0' : port[length] == '\0' && !backend->needs_address;
 }
 
+bool linux_uart_is_port(const char *port)
+{
+    for (size_t i = 0; i < BACKENDS; i++) {
+        if (names(port, backends[i])) {
+            const char *colon = strchr(port, ':');
+            return colon == NULL || backends[i]->is_address == NULL || backends[i]->is_address(colon + 1);
+        }
+    }
+    return false;
+}
+
 hal_uart_t *linux_uart_open(loop_t *loop, const char *port, linux_uart_ready_t ready, void *ctx, char *error,
                             size_t error_size)
 {

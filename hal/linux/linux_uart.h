@@ -25,6 +25,9 @@
  * hal_uart_read gives 0, now or later: those that are left are not told of again. */
 typedef void (*linux_uart_ready_t)(void *ctx);
 
+/* Can PORT be right? If so, and it cannot be opened, something outside is missing now. */
+bool linux_uart_is_port(const char *port);
+
 /* NULL: error[] holds one line that names the port and the reason. The caller owns the result and closes it
  * before the loop. */
 hal_uart_t *linux_uart_open(loop_t *loop, const char *port, linux_uart_ready_t ready, void *ctx, char *error,

@@ -29,6 +29,7 @@ typedef struct {
 typedef struct {
     const char *kind;
     bool needs_address;
+    bool (*is_address)(const char *address); /* can it be right? NULL: any can */
     hal_uart_t *(*open)(const linux_uart_request_t *request);
     void (*close)(hal_uart_t *uart);
     size_t (*read)(hal_uart_t *uart, uint8_t *bytes, size_t size);

@@ -199,6 +199,13 @@ static bool parse(const char *address, size_t *path_length, unsigned *baud)
     return at[1] >= '0' && at[1] <= '9' && *end == '\0' && rate >= BAUD_MIN && rate <= BAUD_MAX;
 }
 
+static bool is_address(const char *address)
+{
+    size_t path_length;
+    unsigned baud;
+    return parse(address, &path_length, &baud);
+}
+
 static serial_t *create(const linux_uart_request_t *request, size_t path_length, unsigned baud)
 {
     serial_t *serial = calloc(1, sizeof *serial + path_length + 1);
@@ -246,6 +253,7 @@ static hal_uart_t *serial_open(const linux_uart_request_t *request)
 const linux_uart_backend_t linux_uart_serial_backend = {
     .kind = "serial",
     .needs_address = true,
+    .is_address = is_address,
     .open = serial_open,
     .close = serial_close,
     .read = serial_read,

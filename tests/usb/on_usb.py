@@ -267,7 +267,7 @@ def refusal(bench: Bench, *command: str | Path) -> str:
     done = subprocess.run(
         [*map(str, command)], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False, timeout=DEADLINE_S
     )
-    assert done.returncode == 2, done
+    assert done.returncode == 3, done
     lines = done.stderr.splitlines()
     assert len(lines) == 1, lines
     bench.say(lines[0])

@@ -360,7 +360,7 @@ def test_link_and_unlink(limb_cli: Callable[..., Cli]) -> None:
     assert cli.good("unlink", "2:2:6.1").output == "2:2:6.1: has no link now\n"
     assert cli("unlink", "2:2:6.1", "--json").json("unlink") == {"input": "2:2:6.1"}
     assert cli("info", "--json").json("info")["links"] == 2
-    assert cli("clear", "--json").json("action") == {"links": 2}
+    assert cli("clear", "--yes", "--json").json("action") == {"links": 2}
     assert cli.good("clear").output == "0 links removed\n"
     assert cli("links", "--json").json("links") == []
 
@@ -385,24 +385,24 @@ def test_configurations(limb_cli: Callable[..., Cli], tmp_path: Path) -> None:
     assert cli("save", "--json").json("configuration") == {"active_configuration": 1, "stored_configurations": 1}
     cli.good("link", "2:2:5.3", "2:2:6.1")
     assert cli.good("save", "3").output == "saved; configuration 3 is active, 2 stored\n"
-    cli.good("clear")
+    cli.good("clear", "--yes")
     assert cli("load", "1", "--json").json("configuration")["active_configuration"] == 1
     assert [row["output"] for row in cli("links", "--json").json("links")] == ["2:2:4.1"]
     cli.good("load", "3")
     assert cli("info", "--json").json("info")["links"] == 2
-    cli.good("clear")
+    cli.good("clear", "--yes")
     assert cli.good("load").output == "loaded, 2 links changed; configuration 3 is active, 2 stored\n"  # D-PRO-16
     assert "there is no configuration 2" in cli.fails(1, "load", "2")
     file = tmp_path / "limb.yaml"
     cli.good("config", "export", str(file))
     text = file.read_text(encoding="utf-8")
-    assert cli("erase", "3", "--json").json("configuration")["stored_configurations"] == 1
-    assert cli("config", "import", str(file), "--json").json("import")["stored_configurations"] == 2
+    assert cli("erase", "3", "--yes", "--json").json("configuration")["stored_configurations"] == 1
+    assert cli("config", "import", str(file), "--yes", "--json").json("import")["stored_configurations"] == 2
     assert cli("info", "--json").json("info")["arbitrator"]["stored_configurations"] == 2
     assert cli.good("config", "export").output == text
     cli.good("load", "3")
-    assert cli.good("erase").output == "erased; none is active, 1 stored\n"
-    assert "there is no active configuration" in cli.fails(1, "erase")
+    assert cli.good("erase", "--yes").output == "erased; none is active, 1 stored\n"
+    assert "there is no active configuration" in cli.fails(1, "erase", "--yes")
 
 
 def test_profile_layer(limb_cli: Callable[..., Cli]) -> None:
@@ -482,16 +482,18 @@ def test_suspend_release_reset(limb: Start) -> None:
     values = Values(pdcpd)
     cli.good("autoconfig", "now")
     values.await_new()
+    all_devices = ["2:2:4", "2:2:5", "2:2:6"]
     for device in ([], ["2:2:4", "2:2:5"]):
-        assert cli("suspend", *device, "--json").json("told") == {"devices": device or "all"}
+        whom = device or all_devices
+        assert cli("suspend", *(device or ["--all"]), "--json").json("told") == {"devices": whom}
         begin_ms, end_ms = half_a_second(pdcpd.port())
-        assert cli.good("release", *device).output == f"{', '.join(device) or 'all devices'}: released\n"
+        assert cli.good("release", *device).output == f"{', '.join(whom)}: released\n"
         arrived = values.until_behind(end_ms)
         assert not [value for value in arrived if begin_ms <= value.time_ms <= end_ms]
     cli.good("suspend", "2:2:4", "--ms", "200")
     values.await_new()
-    for device in (["2:2:5"], []):
-        cli.good("reset", *device)
+    for words in (["2:2:5"], ["--all"]):
+        cli.good("reset", *words)
         await_limb(cli.environment["PDCP_PORT"])
         with Client(cli.environment["PDCP_PORT"]) as client:
             until(lambda client=client: [link.status for link in client.links()] == [2, 2, 2], "all links")  # type: ignore[misc]

@@ -4,6 +4,7 @@ import sys
 from collections.abc import Callable
 from io import BytesIO, TextIOWrapper
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -33,6 +34,9 @@ class Client:
 
     def __exit__(self, *_: object) -> None:
         pass
+
+    def info(self) -> SimpleNamespace:
+        return SimpleNamespace(stored=0)
 
     def read_configurations(self, progress: Callable[[int, int], None]) -> bytes:
         progress(len(self.data), len(self.data))

@@ -23,12 +23,12 @@ def configurations(frame: Frame) -> list[Frame]:
 # D-PRO-16: 0 is the active configuration.
 ACTIONS = [
     (["save"], "01 00", "saved"),
-    (["save", "9"], "01 09", "saved"),
+    (["save", "9", "--yes"], "01 09", "saved"),
     (["load"], "02 00", "loaded, 7 links changed"),
     (["load", "0"], "02 00", "loaded, 7 links changed"),
     (["load", "9"], "02 09", "loaded, 7 links changed"),
-    (["erase"], "03 00", "erased"),
-    (["erase", "255"], "03 FF", "erased"),
+    (["erase", "--yes"], "03 00", "erased"),
+    (["erase", "255", "--yes"], "03 FF", "erased"),
 ]
 
 

@@ -31,6 +31,7 @@ from .common import (
     waiting,
     wants_json,
 )
+from .consent import ForceOption, may_overwrite
 
 SEND_PATIENCE_S = 1.0  # a full transmit queue empties meanwhile
 
@@ -265,10 +266,11 @@ def busload(
 
 
 @contextmanager
-def _open_output(path: str) -> Iterator[TextIO]:
+def _open_output(path: str, force: bool) -> Iterator[TextIO]:
     if path == "-":
         yield sys.stdout
         return
+    may_overwrite(path, force)
     with ExitStack() as stack:
         try:
             stream = stack.enter_context(Path(path).open("w", encoding="ascii", errors="replace"))
@@ -283,11 +285,12 @@ def record(
     channel: ChannelOption = "",
     option: BusOption = None,
     seconds: SecondsOption = None,
+    force: ForceOption = False,
 ) -> None:
     """Write what is on a bus to a log, in the format of candump -L."""
     source = Source("", interface, channel, option, seconds)
     count = 0
-    with _open_output(file) as output:
+    with _open_output(file, force) as output:
         for frame in source.frames():
             if frame is None:
                 output.flush()

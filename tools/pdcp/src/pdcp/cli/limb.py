@@ -1,6 +1,7 @@
 """Commands that ask and tell devices: get, set, suspend, release, reset, passthrough."""
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
@@ -11,6 +12,7 @@ from ..model import BROADCAST, ChannelId, Identity, parse_number
 from ..parameters import PARAMETERS, TRANSFER_KINDS, TRANSFER_TYPE, Kind, Parameter, find
 from . import targets
 from .common import Json, JsonOption, UsageFault, about, connect, show, waiting
+from .consent import AllOption, DryRunOption, consented
 from .tables import parameter_grid, parameter_json, parameters_json, read_parameters
 
 CAN_DATA_MAX = 8
@@ -20,7 +22,7 @@ SIZES = {"u8": 1, "u16": 2, "u32": 4}
 
 TargetArgument = Annotated[str, typer.Argument(metavar="TARGET", help=targets.TARGET_HELP)]
 DevicesArgument = Annotated[
-    list[str] | None, typer.Argument(metavar="DEVICE", help=f"{targets.DEVICE_HELP} Without: all.")
+    list[str] | None, typer.Argument(metavar="DEVICE", help=f"{targets.DEVICE_HELP} Without: all, after a question.")
 ]
 
 
@@ -160,21 +162,48 @@ def set_(
 # --- commands to devices ---
 
 
+@dataclass(frozen=True)
+class _Order:
+    """What is done to devices, in words: suspend, suspended, until released."""
+
+    verb: str
+    done: str
+    how_long: str = ""
+    harmless: bool = False  # all may be told so without a question
+
+
+def _count(devices: int) -> str:
+    return "the only device" if devices == 1 else f"all {devices} devices"
+
+
 def _each(
     ctx: typer.Context,
     as_json: bool,
     names: list[str] | None,
-    done: str,
+    order: _Order,
     act: Callable[[Client, Identity | None], None],
+    everyone: bool = False,
+    dry_run: bool = False,
 ) -> None:
-    """Does something to each of the devices named, or at once to all, and says so."""
-    with connect(ctx) as client, waiting("working"):
-        chosen: list[Identity | None] = [targets.device(client, name) for name in names] if names else [None]
-        for identity in chosen:
-            with about(identity or "all devices"):
-                act(client, identity)
-    text = ", ".join(str(identity or "all devices") for identity in chosen)
-    show(ctx, as_json, {"devices": [str(each) for each in chosen if each] or "all"}, Text(f"{text}: {done}"))
+    """Does something to each of the devices named, or at once to all, and says to whom."""
+    if names and everyone:
+        raise UsageFault("give devices or --all, not both")
+    with connect(ctx) as client:
+        chosen = [targets.device(client, name) for name in names or []]
+        told = chosen or [device.identity for device in client.devices()]
+        whom = ", ".join(map(str, chosen)) or _count(len(told))
+        agreed = everyone or bool(names) or order.harmless or not told
+        what = f"{order.verb} {whom} {order.how_long}".rstrip()
+        if not consented(ctx, as_json, what, agreed, dry_run, option="--all"):
+            return
+        with waiting("working"):
+            orders: list[Identity | None] = [*chosen] or [None]
+            for identity in orders:
+                with about(identity or "all devices"):
+                    act(client, identity)
+    text = ", ".join(map(str, told)) or "there is no device"
+    done = f"{order.done} {order.how_long}".rstrip()
+    show(ctx, as_json, {"devices": [str(each) for each in told]}, Text(f"{text}: {done}"))
 
 
 def suspend(
@@ -184,21 +213,37 @@ def suspend(
         int,
         typer.Option("--ms", min=0, max=SUSPEND_MAX_MS, metavar="MS", help="For so long; 0: until they are released."),
     ] = 0,
+    everyone: AllOption = False,
+    dry_run: DryRunOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Make devices stop sending channel data."""
-    done = f"suspended for {ms} ms" if ms else "suspended until released"
-    _each(ctx, as_json, device, done, lambda client, identity: client.suspend(identity, ms))
+    """Make devices stop sending channel data. Inputs that they feed keep their last value."""
+    order = _Order("suspend", "suspended", f"for {ms} ms" if ms else "until released ('pdcp release')")
+    _each(ctx, as_json, device, order, lambda client, identity: client.suspend(identity, ms), everyone, dry_run)
 
 
-def release(ctx: typer.Context, device: DevicesArgument = None, as_json: JsonOption = False) -> None:
+def release(
+    ctx: typer.Context,
+    device: Annotated[
+        list[str] | None, typer.Argument(metavar="DEVICE", help=f"{targets.DEVICE_HELP} Without: all.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
     """Let suspended devices send again."""
-    _each(ctx, as_json, device, "released", lambda client, identity: client.release(identity))
+    order = _Order("release", "released", harmless=True)
+    _each(ctx, as_json, device, order, lambda client, identity: client.release(identity))
 
 
-def reset(ctx: typer.Context, device: DevicesArgument = None, as_json: JsonOption = False) -> None:
+def reset(
+    ctx: typer.Context,
+    device: DevicesArgument = None,
+    everyone: AllOption = False,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Reset devices. They bind again and get their links back."""
-    _each(ctx, as_json, device, "reset", lambda client, identity: client.reset(identity))
+    order = _Order("reset", "reset")
+    _each(ctx, as_json, device, order, lambda client, identity: client.reset(identity), everyone, dry_run)
 
 
 def passthrough(

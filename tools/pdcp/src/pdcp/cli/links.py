@@ -11,8 +11,10 @@ from rich.text import Text
 from ..client import Client
 from ..errors import ErrorCode, RequestError
 from ..model import Action, Flags
+from ..tlv import parse
 from . import targets
 from .common import CommandError, Json, JsonOption, about, connect, show, waiting
+from .consent import DryRunOption, YesOption, consented, require
 from .tables import STATUS_STYLES
 
 NumberArgument = Annotated[
@@ -83,16 +85,25 @@ def unlink(
     show(ctx, as_json, {"input": str(target)}, f"{target}: has no link now")
 
 
+def _links(count: int) -> str:
+    return f"{count} {'link' if count == 1 else 'links'}"
+
+
 def _act(ctx: typer.Context, as_json: bool, what: Action, done: str, argument: int = 0) -> None:
     """One action of the profile layer, and how many links it made or removed."""
     with connect(ctx) as client, waiting("working"):
         count = client.action(what, argument)
-    show(ctx, as_json, {"links": count}, f"{count} {'link' if count == 1 else 'links'} {done}")
+    show(ctx, as_json, {"links": count}, f"{_links(count)} {done}")
 
 
-def clear(ctx: typer.Context, as_json: JsonOption = False) -> None:
+def clear(
+    ctx: typer.Context, yes: YesOption = False, dry_run: DryRunOption = False, as_json: JsonOption = False
+) -> None:
     """Remove all links."""
-    _act(ctx, as_json, Action.CLEAR, "removed")
+    with connect(ctx) as client:
+        count = client.system_info().links
+    if consented(ctx, as_json, f"remove {_links(count)}", yes or count == 0, dry_run):
+        _act(ctx, as_json, Action.CLEAR, "removed")
 
 
 def enforce(ctx: typer.Context, as_json: JsonOption = False) -> None:
@@ -143,6 +154,10 @@ def _name(number: int) -> str:
     return f"configuration {number}" if number else "active configuration"
 
 
+def _missing(number: int) -> CommandError:
+    return CommandError(f"there is no {_name(number)}; 'pdcp config export' shows what is stored")
+
+
 @contextmanager
 def _stored(number: int) -> Iterator[None]:
     """A number that is out of range inside is one under which nothing is stored."""
@@ -150,13 +165,13 @@ def _stored(number: int) -> Iterator[None]:
         yield
     except RequestError as error:
         if error.code == ErrorCode.OUT_OF_RANGE:
-            raise CommandError(f"there is no {_name(number)}; 'pdcp config export' shows what is stored") from None
+            raise _missing(number) from None
         raise
 
 
 def _with_active(ctx: typer.Context, as_json: bool, number: int, act: Callable[[Client], str]) -> None:
     """An action on a configuration; tells which is active afterwards and how many are stored."""
-    with connect(ctx) as client, waiting("working"):
+    with connect(ctx) as client:
         with about(_name(number)):
             done = act(client)
         info = client.info()
@@ -165,15 +180,24 @@ def _with_active(ctx: typer.Context, as_json: bool, number: int, act: Callable[[
     show(ctx, as_json, data, f"{done}; {active}, {info.stored} stored")
 
 
+def _is_stored(client: Client, number: int) -> bool:
+    return any(stored.index == number for stored in parse(client.read_configurations()))
+
+
 def save(
     ctx: typer.Context,
     number: NumberArgument = 0,
+    yes: YesOption = False,
     as_json: JsonOption = False,
 ) -> None:
-    """Store the links as a configuration."""
+    """Store the links as a configuration. Over another than the active one it asks first."""
 
     def act(client: Client) -> str:
-        client.action(Action.SAVE, number)
+        with waiting("looking"):
+            asks = not yes and number != 0 and number != client.info().active and _is_stored(client, number)
+        require(f"overwrite {_name(number)}", not asks, "--yes")
+        with waiting("working"):
+            client.action(Action.SAVE, number)
         return "saved"
 
     _with_active(ctx, as_json, number, act)
@@ -183,18 +207,31 @@ def load(ctx: typer.Context, number: NumberArgument = 0, as_json: JsonOption = F
     """Make the links of a stored configuration, and remove all others."""
 
     def act(client: Client) -> str:
-        with _stored(number):
+        with _stored(number), waiting("working"):
             count = client.action(Action.LOAD, number)
-        return f"loaded, {count} {'link' if count == 1 else 'links'} changed"
+        return f"loaded, {_links(count)} changed"
 
     _with_active(ctx, as_json, number, act)
 
 
-def erase(ctx: typer.Context, number: NumberArgument = 0, as_json: JsonOption = False) -> None:
+def erase(
+    ctx: typer.Context,
+    number: NumberArgument = 0,
+    yes: YesOption = False,
+    dry_run: DryRunOption = False,
+    as_json: JsonOption = False,
+) -> None:
     """Forget a stored configuration. Its links stay as they are."""
+    if dry_run or not yes:
+        with connect(ctx) as client, waiting("looking"):
+            chosen = number or client.info().active
+            if not _is_stored(client, chosen):
+                raise _missing(number)
+        if not consented(ctx, as_json, f"erase configuration {chosen}", yes, dry_run):
+            return
 
     def act(client: Client) -> str:
-        with _stored(number):
+        with _stored(number), waiting("working"):
             client.action(Action.ERASE, number)
         return "erased"
 

@@ -45,6 +45,11 @@ typedef struct {
 
     /* What the drivers have counted since the start. NULL: they count nothing. */
     uint32_t (*counter)(void *ctx, arb_port_counter_t counter);
+
+    /* Takes a request of the host that has been answered, for a log: its message, its payload, and ARB_OK or
+     * the error (arb_error.h). The payload may be too short if there was an error, and stands there until
+     * the function returns. NULL: nobody wants to know. */
+    void (*host_served)(void *ctx, uint16_t message, const uint8_t *payload, uint16_t len, uint8_t error);
 } arb_port_t;
 
 #define ARB_PORT_NVM_PAGE 64u /* a write never crosses a multiple of this */

@@ -8,6 +8,9 @@
 #include <time.h>
 #include <unistd.h>
 
+#include "arb_error.h"
+#include "pdcpd_order.h"
+
 enum { SECOND_US = 1000000, PATIENCE_MS = 500 };
 
 /* Does standard error lead to the journal, which knows the time? It says so by
@@ -112,6 +115,33 @@ uint64_t pdcpd_log_step(pdcpd_log_t *log, uint64_t now_us)
         }
     }
     return next_us;
+}
+
+/* --- The host --- */
+
+static void say_host(pdcpd_log_t *log, uint64_t now_us, const char *format, ...)
+    __attribute__((format(printf, 3, 4)));
+
+static void say_host(pdcpd_log_t *log, uint64_t now_us, const char *format, ...)
+{
+    va_list arguments;
+    va_start(arguments, format);
+    say(log, now_us, PDCPD_LOG_INFO, PDCPD_LOG_KIND_HOST, format, arguments);
+    va_end(arguments);
+}
+
+void pdcpd_log_served(pdcpd_log_t *log, uint64_t now_us, uint16_t message, const uint8_t *payload,
+                      uint16_t len, uint8_t error)
+{
+    char order[PDCPD_ORDER_TEXT];
+    if (!pdcpd_order_text(order, message, payload, len)) {
+        return;
+    }
+    if (error == ARB_OK) {
+        say_host(log, now_us, "the host: %s", order);
+    } else {
+        say_host(log, now_us, "the host: %s: refused with error %02Xh", order, error);
+    }
 }
 
 /* --- Events --- */

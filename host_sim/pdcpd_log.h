@@ -13,6 +13,7 @@ enum {
     PDCPD_LOG_RATE = 20,
     PDCPD_LOG_KIND_OTHER =
         PDCP_EVENT_REQUEST, /* lines that tell of no event; kinds of events have lower numbers */
+    PDCPD_LOG_KIND_HOST,
     PDCPD_LOG_KINDS,
     PDCPD_LOG_TEXT = 200
 };
@@ -45,6 +46,11 @@ void pdcpd_log_say(pdcpd_log_t *log, uint64_t now_us, pdcpd_level_t level, const
 /* Says what an event of the arbitrator means. */
 void pdcpd_log_event(pdcpd_log_t *log, uint64_t now_us, const pdcp_tables_t *tables,
                      const pdcp_event_t *event);
+
+/* Says what the host has changed or tried to change, and nothing of what it only read. As host_served of
+ * arb_port.h. */
+void pdcpd_log_served(pdcpd_log_t *log, uint64_t now_us, uint16_t message, const uint8_t *payload,
+                      uint16_t len, uint8_t error);
 
 /* Tells of lines that were left out. Returns the time of the next call at the latest, UINT64_MAX: none. */
 uint64_t pdcpd_log_step(pdcpd_log_t *log, uint64_t now_us);

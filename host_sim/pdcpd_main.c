@@ -119,6 +119,12 @@ static int8_t nvm_status(void *ctx)
 }
 
 /* Neither a pseudo-terminal nor the simulated bus loses anything; of a serial line nobody tells. */
+static void host_served(void *ctx, uint16_t message, const uint8_t *payload, uint16_t len, uint8_t error)
+{
+    daemon_t *daemon = ctx;
+    pdcpd_log_served(&daemon->log, loop_now_us(daemon->loop), message, payload, len, error);
+}
+
 static uint32_t counter(void *ctx, arb_port_counter_t which)
 {
     const daemon_t *daemon = ctx;
@@ -357,7 +363,8 @@ static bool start(daemon_t *daemon)
                                 .nvm_read = nvm_read,
                                 .nvm_write = nvm_write,
                                 .nvm_status = nvm_status,
-                                .counter = counter};
+                                .counter = counter,
+                                .host_served = host_served};
     const arb_settings_t settings = {.serial = hal_sys_serial(),
                                      .seed = hal_sys_random(),
                                      .strict_crc = daemon->options.strict_crc,

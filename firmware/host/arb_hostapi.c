@@ -197,6 +197,9 @@ static bool serve(arb_hostapi_t *api, const arb_hostenv_t *env, uint32_t now_ms)
     if (error == ARB_PENDING) {
         return false;
     }
+    if (env->port->host_served != NULL) {
+        env->port->host_served(env->port->ctx, api->held[0].id, call.payload, call.len, error);
+    }
     api->answer_out.len = finish(api, api->answer, &api->held[0], error, call.answer_len);
     drop_front(api);
     return true;

@@ -11,7 +11,7 @@ import pytest
 from programs import END_TIMEOUT_S, Pdcpd, until
 from rawhost import RawHost
 
-from pdcp import ChannelId, Client, ConnectionFailedError, Identity, Link, LinkStatus
+from pdcp import Action, ChannelId, Client, ConnectionFailedError, Identity, Link, LinkStatus, RequestError
 
 Start = Callable[..., Pdcpd]
 Connect = Callable[[Pdcpd], RawHost]
@@ -298,3 +298,16 @@ def test_nothing_is_left_in_the_working_folder(programs: Path, tmp_path: Path) -
         process.terminate()
         assert process.wait(END_TIMEOUT_S) == 0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_the_log_tells_what_a_host_changes(start: Start) -> None:
+    """One line for each change, with its outcome; nothing of what was only read (D-LIN-7)."""
+    pdcpd = start()
+    with Client(pdcpd.port()) as host:
+        host.info()
+        host.action(Action.CLEAR)
+        with pytest.raises(RequestError):
+            host.unlink(ChannelId(Identity(9, 9, 9), 1))
+    until(lambda: any("unlinks" in line for line in pdcpd.errors), "both lines are there")
+    told = [line.partition("pdcpd: the host: ")[2] for line in pdcpd.errors if "the host" in line]
+    assert told == ["removes all links", "unlinks 9:9:9.1: refused with error 03h"]

@@ -145,6 +145,79 @@ static void test_a_journal_gets_no_time(void)
     TEST_ASSERT_EQUAL_STRING("pdcpd: now\n", close_log());
 }
 
+/* A request of the host as [API 3.3] and D-API-5 lay it out, and what the log says of it. */
+typedef struct {
+    uint16_t message;
+    uint16_t len;
+    uint8_t payload[26];
+    const char *line;
+} order_t;
+
+static void test_what_a_host_changes_is_told(void)
+{
+    static const order_t orders[] = {
+        {0x2304, 10, {2, 0, 2, 0, 4, 0, 1, 7, 0x40, 0x03}, "sets parameter 7 of 2:2:4.1 to 40 03"},
+        {0x2304,
+         26,
+         {2, 0, 2, 0, 4, 0, 0, 9, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1},
+         "sets parameter 9 of 2:2:4.0 to 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 01 ..."},
+        {0x2307, 14, {2, 0, 2, 0, 4, 0, 1, 0x34, 0x12, 2, 0, 5, 0, 2}, "links 2:2:4.1 -> 4660:2:5.2"},
+        {0x230A, 15, {2, 0, 2, 0, 4, 0, 3, 3, 0xF4, 1, 9, 9, 9, 9, 9}, "sends 03 F4 01 to 2:2:4"},
+        {0x230A,
+         15,
+         {2, 0, 2, 0, 4, 0, 255, 1, 2, 3, 4, 5, 6, 7, 8},
+         "sends 01 02 03 04 05 06 07 08 to 2:2:4"},
+        {0x230D, 1, {0}, "resets all devices"},
+        {0x230D, 1, {3}, "resets device 3 of the list"},
+        {0x2404, 1, {0x0B}, "sets the flags to 0Bh"},
+        {0x2407, 2, {1, 9}, "saves configuration 9"},
+        {0x2407, 2, {2, 0}, "loads configuration 0, the active one"},
+        {0x2407, 2, {3, 255}, "erases configuration 255"},
+        {0x2407, 2, {4, 0}, "has terminal channels linked"},
+        {0x2407, 2, {5, 0}, "removes all links"},
+        {0x2407, 2, {6, 0}, "enforces sole access"},
+        {0x2407, 2, {7, 0}, "has stand-ins sought"},
+        {0x2407, 2, {8, 0}, "adopts stand-ins"},
+        {0x2407, 2, {9, 0}, "wants action 9"},
+        {0x240D, 6, {0, 1, 2, 1, 0, 0}, "writes configurations, bytes 256 to 257 of 258"},
+        {0x2410, 7, {2, 0, 2, 0, 5, 0, 2}, "unlinks 2:2:5.2"},
+    };
+    char expected[4096] = "";
+    open_log_without_time();
+    for (size_t i = 0; i < sizeof orders / sizeof orders[0]; i++) {
+        pdcpd_log_served(&log_of_test, 0, orders[i].message, orders[i].payload, orders[i].len, 0);
+        const size_t len = strlen(expected);
+        (void)snprintf(&expected[len], sizeof expected - len, "pdcpd: the host: %s\n", orders[i].line);
+    }
+    TEST_ASSERT_EQUAL_STRING(expected, close_log());
+}
+
+static void test_what_a_host_was_refused_is_told(void)
+{
+    static const uint8_t link[14] = {2, 0, 2, 0, 4, 0, 1, 2, 0, 2, 0, 5, 0, 2};
+    open_log_without_time();
+    pdcpd_log_served(&log_of_test, 0, 0x2307, link, sizeof link, 0x08);
+    TEST_ASSERT_EQUAL_STRING("pdcpd: the host: links 2:2:4.1 -> 2:2:5.2: refused with error 08h\n",
+                             close_log());
+}
+
+/* What only reads, what nobody knows, and what is too short to say what it was meant to do. */
+static void test_what_changes_nothing_is_not_told(void)
+{
+    static const uint8_t zeros[32];
+    static const uint16_t messages[] = {0x2201, 0x2204, 0x2301, 0x2401, 0x240A, 0x2413, 0x2416, 0x7777};
+    open_log_without_time();
+    for (size_t i = 0; i < sizeof messages / sizeof messages[0]; i++) {
+        pdcpd_log_served(&log_of_test, 0, messages[i], zeros, sizeof zeros, 0);
+    }
+    pdcpd_log_served(&log_of_test, 0, 0x2304, zeros, 8, 0x01);
+    pdcpd_log_served(&log_of_test, 0, 0x2307, zeros, 13, 0x01);
+    pdcpd_log_served(&log_of_test, 0, 0x230A, zeros, 14, 0x01);
+    pdcpd_log_served(&log_of_test, 0, 0x240D, zeros, 4, 0x01);
+    pdcpd_log_served(&log_of_test, 0, 0x2410, zeros, 6, 0x01);
+    TEST_ASSERT_EQUAL_STRING("", close_log());
+}
+
 int main(void)
 {
     UNITY_BEGIN();
@@ -154,5 +227,8 @@ int main(void)
     RUN_TEST(test_one_line_too_many_is_told_itself);
     RUN_TEST(test_lines_begin_with_the_time);
     RUN_TEST(test_a_journal_gets_no_time);
+    RUN_TEST(test_what_a_host_changes_is_told);
+    RUN_TEST(test_what_a_host_was_refused_is_told);
+    RUN_TEST(test_what_changes_nothing_is_not_told);
     return UNITY_END();
 }

@@ -4,11 +4,14 @@ import json
 from collections.abc import Callable
 
 import pytest
+import typer
+import typer.main
 from scripted import Script, ScriptedArbitrator
+from typer.core import TyperGroup
 
 import pdcp
 from pdcp.cli import app
-from pdcp.cli.common import run
+from pdcp.cli.common import PROGRAM_OPTIONS, run
 from pdcp.wire import Frame
 
 INFO = bytes((1, 0, 1, 0, 64, 0xFF, 0x80, 2, 3, 2, 0))  # configuration 3 is active, two are stored
@@ -66,3 +69,42 @@ def test_help_shows_no_type_of_what_takes_no_value(capsys: pytest.CaptureFixture
     assert run(app, [*command, "--help"]) == 0
     out = capsys.readouterr().out
     assert "--help" in out and "bool" not in out
+
+
+@pytest.mark.parametrize("where", [0, 1, 2])
+@pytest.mark.parametrize("form", ["--port {}", "-p {}", "--port={}"])
+def test_the_port_may_stand_anywhere(
+    arbitrator: Callable[[Script], ScriptedArbitrator], capsys: pytest.CaptureFixture[str], where: int, form: str
+) -> None:
+    peer = arbitrator(configurations)
+    words = ["load", "9"]
+    words[where:where] = form.format(peer.port).split()
+    assert run(app, words) == 0
+    assert capsys.readouterr().out.startswith("loaded")
+
+
+def test_behind_two_dashes_are_values(
+    arbitrator: Callable[[Script], ScriptedArbitrator], capsys: pytest.CaptureFixture[str]
+) -> None:
+    peer = arbitrator(configurations)
+    assert run(app, ["-p", peer.port, "load", "--", "--port"]) == 2
+    assert "'N'" in capsys.readouterr().err and peer.requests == []
+    assert run(app, ["load", "9", "--port"]) == 2
+    assert capsys.readouterr().err == "pdcp: --port needs a value\n"
+
+
+def test_no_command_has_an_option_of_the_program() -> None:
+    program = typer.main.get_command(app)
+    assert isinstance(program, TyperGroup)
+    commands = list(program.commands.values())
+    for command in commands:
+        if isinstance(command, TyperGroup):
+            commands += command.commands.values()
+        names = {name for option in command.params for name in option.opts}
+        assert not names & set(PROGRAM_OPTIONS), command.name
+
+
+@pytest.mark.parametrize("command", [[], ["load"], ["config"], ["config", "decode"]])
+def test_help_has_a_short_name(capsys: pytest.CaptureFixture[str], command: list[str]) -> None:
+    assert run(app, [*command, "-h"]) == 0
+    assert "Usage: pdcp" in capsys.readouterr().out

@@ -174,7 +174,7 @@ def test_values_that_are_written(kind: Kind, name: str, words: list[str], raw: s
         (Kind.DEVICE, "beacon-interval", ["65536"], "65536"),
         (Kind.DEVICE, "beacon-interval", ["-1"], "-1"),
         (Kind.DEVICE, "beacon-interval", ["soon"], "soon"),
-        (Kind.DEVICE, "beacon-interval", ["1", "2"], "takes 1 values"),
+        (Kind.DEVICE, "beacon-interval", ["1", "2"], "takes 1 value "),
         (Kind.DEVICE, "version", ["1"], "firmware, hardware"),
         (Kind.OUTPUT, "enabled", ["maybe"], "maybe"),
         (Kind.OUTPUT, "required", ["256"], "256"),
@@ -186,6 +186,27 @@ def test_values_that_are_none(kind: Kind, name: str, words: list[str], what: str
     assert isinstance(parameter, parameters.Parameter)
     with pytest.raises(ValueError, match=what):
         parameter.parse(words)
+
+
+FIXED = [each for rows in parameters.PARAMETERS.values() for each in rows if each.size is not None]
+
+
+@given(st.sampled_from(FIXED), st.binary(min_size=4, max_size=4))
+def test_a_value_is_taken_as_it_is_shown(parameter: parameters.Parameter, value: bytes) -> None:
+    """In quotes, or word by word as a shell hands it over."""
+    assert parameter.size is not None
+    value = value[: parameter.size]
+    shown = parameter.show(value)
+    assert parameter.parse([shown]) == value, shown
+    assert parameter.parse(shown.split()) == value, shown
+
+
+@pytest.mark.parametrize(("kind", "name", "raw", "shown", "decoded"), VALUES)
+def test_the_values_above_are_taken_too(kind: Kind, name: str, raw: str, shown: str, decoded: object) -> None:
+    parameter = find(kind, name)
+    assert isinstance(parameter, parameters.Parameter)
+    if shown.isascii():
+        assert parameter.show(parameter.parse([shown])) == shown
 
 
 def test_parameters_by_number_and_name() -> None:

@@ -1,12 +1,12 @@
 """What can go wrong between host and arbitrator.
 
-    PdcpError
-      ConnectionFailedError   the port cannot be opened, or is gone
-      NoAnswerError           no answer in time
-      BadAnswerError          an answer that is none
-      RequestError            the arbitrator said no
-        UnknownMessageError   2200h: it does not know this message
-        ResetError            230Fh: these devices were not reset
+PdcpError
+  ConnectionFailedError   the port cannot be opened, or is gone
+  NoAnswerError           no answer in time
+  BadAnswerError          an answer that is none
+  RequestError            the arbitrator said no
+    UnknownMessageError   2200h: it does not know this message
+    ResetError            230Fh: these devices were not reset
 """
 
 from collections.abc import Iterable

@@ -1,6 +1,7 @@
 """Parameters of devices and channels (pdcp-bus.md 4; [PROFILE tables 2.8 and 2.9 and 2.10]): names, units, layouts, and
 their values as text."""
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -43,6 +44,8 @@ class Form(StrEnum):
 
 TRANSFER_KINDS = {number: Kind(name) for number, name in protocol.TEXTS["transfer"].items()}
 _SWITCHES = {0: "off", 1: "on"}
+_SHOWN_WORD = re.compile(r".* \(?([0-9A-F]{4}h)\)?")  # a type or a profile
+_SHOWN_TIME = re.compile(r"(\S+) ?ms")
 
 FieldValue = int | str | bool
 Decoded = dict[str, FieldValue] | str | list[int]
@@ -84,9 +87,19 @@ class Field:
             case _:
                 return str(number)
 
+    def bare(self, text: str) -> str | None:
+        """What show() writes of a time, a type or a profile, without the words around it; None: it is none of these."""
+        if self.style is Style.MILLISECONDS:
+            found = _SHOWN_TIME.fullmatch(text)
+        else:
+            found = _SHOWN_WORD.fullmatch(text) if self.style in (Style.TYPE, Style.PROFILE) else None
+        return found and found[1]
+
     def parse(self, text: str) -> bytes:
+        """The bytes of what a user wrote, which may be what show() writes. Raises ValueError."""
         known: dict[Style, Mapping[int, str]] = {Style.SWITCH: _SWITCHES, Style.TRANSFER: TRANSFER_KINDS}
         words = {word: number for number, word in known.get(self.style, {}).items()}
+        text = self.bare(text) or text
         if text.lower() in words:
             number = words[text.lower()]
         elif self.style is Style.PROFILE and not text.isdecimal() and not text.lower().startswith("0x"):
@@ -151,16 +164,32 @@ class Parameter:
             return "; ".join(shown)
         return ", ".join(f"{field.label} {text}" for field, text in zip(self.fields, shown, strict=True))
 
+    def _shown_words(self, text: str) -> list[str]:
+        """The fields of a text as show() writes it, without their labels; empty: it is none."""
+        if len(self.fields) == 1:
+            return [text] if self.fields[0].bare(text) else []
+        if self.fields[0].style is Style.TYPE:
+            return text.split("; ") if "; " in text else []
+        labelled = ", ".join(f"{re.escape(field.label)} (.+)" for field in self.fields)
+        found = re.fullmatch(labelled, text)
+        return list(found.groups()) if found else []
+
     def parse(self, words: Sequence[str]) -> bytes:
-        """A value from what a user wrote: one word for each field, a text, or channels. Raises ValueError."""
+        """A value from what a user wrote: one word for each field, a text, channels, or what show() writes, in one
+        word or several. Raises ValueError."""
         if self.form is Form.TEXT:
             return " ".join(words).encode()
         if self.form is Form.CHANNELS:
             names = [] if list(words) == ["none"] else [part for word in words for part in word.split(",") if part]
             return bits_of([parse_number(name) for name in names])
+        if list(words) == ["none"] and self.kind is Kind.INPUT and self.number in protocol.NO_SOURCE:
+            numbers = protocol.NO_SOURCE[self.number]
+            return b"".join(n.to_bytes(field.size, "little") for n, field in zip(numbers, self.fields, strict=True))
+        words = self._shown_words(" ".join(words)) or words
         if len(words) != len(self.fields):
             wanted = ", ".join(field.name for field in self.fields)
-            raise ValueError(f"{self.name} takes {len(self.fields)} values ({wanted}), not {len(words)}")
+            values = "1 value" if len(self.fields) == 1 else f"{len(self.fields)} values"
+            raise ValueError(f"{self.name} takes {values} ({wanted}), not {len(words)}")
         return b"".join(field.parse(word) for field, word in zip(self.fields, words, strict=True))
 
 

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from . import bus, config, limb, links, ports, tables, targets, watch
-from .common import Settings, run
+from .common import HELP_NAMES, Settings, run
 
 app = typer.Typer(
     name="pdcp",
@@ -19,7 +19,7 @@ app = typer.Typer(
 )
 
 
-@app.callback()
+@app.callback(context_settings={"help_option_names": HELP_NAMES})
 def options(
     ctx: typer.Context,
     port: Annotated[

@@ -73,6 +73,11 @@ _WORDING = (
     (", unable to parse string as a number", ""),
 )
 
+HELP_NAMES = ["-h", "--help"]
+
+# Options of the program that take a value; no command has one of the same name.
+PROGRAM_OPTIONS = ("--port", "-p", "--baud", "--timeout")
+
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of a table.")]
 
 
@@ -201,11 +206,31 @@ def _tidy_help(group: TyperGroup) -> None:
     """Typer's help tells the type of every option, also of one that takes no value and of --help; a text to stand in
     its place, even an empty one, goes before it."""
     for command in (group, *group.commands.values()):
-        for option in command.get_params(typer.Context(command)):
+        for option in command.get_params(typer.Context(command, help_option_names=HELP_NAMES)):
             if isinstance(option, TyperOption) and option.is_flag:
                 option.metavar = ""
         if isinstance(command, TyperGroup) and command is not group:
             _tidy_help(command)
+
+
+def _program_options_first(arguments: Sequence[str]) -> list[str]:
+    """Options of the program may stand anywhere before --; the parser wants them before the command."""
+    first: list[str] = []
+    rest: list[str] = []
+    words = iter(arguments)
+    for word in words:
+        if word == "--":
+            rest += [word, *words]
+        elif word in PROGRAM_OPTIONS:
+            value = next(words, None)
+            if value is None:
+                raise UsageFault(f"{word} needs a value")
+            first += [word, value]
+        elif word.partition("=")[0] in PROGRAM_OPTIONS:
+            first.append(word)
+        else:
+            rest.append(word)
+    return first + rest
 
 
 def run(app: typer.Typer, arguments: Sequence[str]) -> int:
@@ -214,7 +239,7 @@ def run(app: typer.Typer, arguments: Sequence[str]) -> int:
     if isinstance(command, TyperGroup):
         _tidy_help(command)
     try:
-        status = command.main(list(arguments), prog_name="pdcp", standalone_mode=False)
+        status = command.main(_program_options_first(arguments), prog_name="pdcp", standalone_mode=False)
         sys.stdout.flush()
         return status if isinstance(status, int) else Status.OK
     except Exit as end:

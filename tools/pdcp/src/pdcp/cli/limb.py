@@ -28,7 +28,8 @@ DevicesArgument = Annotated[
 
 def register(app: typer.Typer) -> None:
     app.command(epilog=targets.EPILOG)(get)
-    app.command(name="set", epilog=targets.EPILOG)(set_)
+    # A negative number is a value, not an option.
+    app.command(name="set", epilog=targets.EPILOG, context_settings={"ignore_unknown_options": True})(set_)
     app.command(epilog=targets.EPILOG)(suspend)
     app.command(epilog=targets.EPILOG)(release)
     app.command(epilog=targets.EPILOG)(reset)
@@ -139,7 +140,7 @@ def set_(
         list[str],
         typer.Argument(
             metavar="VALUE",
-            help="As 'get' prints it: a number for each field, on or off, text, channels (2,3). For any parameter: "
+            help="As 'get' prints it, or a number for each field, on or off, text, channels (2,3). For any parameter: "
             "hex:01F4, text:..., u8:N, u16:N, u32:N.",
         ),
     ],

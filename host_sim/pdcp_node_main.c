@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include "arb_version.h"
+#include "complaint.h"
 #include "hal_can.h"
 #include "hal_sys.h"
 #include "line_writer.h"
@@ -253,7 +254,7 @@ static void on_ready(void *ctx)
 
 static bool complain(const char *error)
 {
-    (void)fprintf(stderr, "pdcp-node: %s\n", error);
+    complaint_say("pdcp-node", error);
     return false;
 }
 

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include "arb_app.h"
+#include "complaint.h"
 #include "hal_sys.h"
 #include "linux_can.h"
 #include "linux_nvm.h"
@@ -246,7 +247,7 @@ static uint64_t work_world(daemon_t *daemon)
 
 static bool complain(const char *error)
 {
-    (void)fprintf(stderr, "pdcpd: %s\n", error);
+    complaint_say("pdcpd", error);
     return false;
 }
 

@@ -8,6 +8,7 @@
 #include <string.h>
 
 #include "arb_version.h"
+#include "complaint.h"
 #include "linux_can.h"
 #include "pdcpd_list.h"
 
@@ -194,12 +195,14 @@ static void read_file(pdcpd_options_t *options, bool log_given)
     file.options.log = options->log;
     const int line = ini_parse(options->config, on_key, &file);
     if (line != 0) {
+        char text[COMPLAINT_TEXT];
         if (line < 0) {
-            (void)fprintf(stderr, "pdcpd: %s: cannot be read\n", options->config);
+            (void)snprintf(text, sizeof text, "%s: cannot be read", options->config);
         } else {
-            (void)fprintf(stderr, "pdcpd: %s:%d: %s\n", options->config, line,
-                          file.error[0] != '\0' ? file.error : "not a line of the form key = value");
+            (void)snprintf(text, sizeof text, "%s:%d: %s", options->config, line,
+                           file.error[0] != '\0' ? file.error : "not a line of the form key = value");
         }
+        complaint_say("pdcpd", text);
         exit(PDCPD_EXIT_USAGE);
     }
     take(&options->can, &file.options.can);

@@ -19,19 +19,28 @@ _ERROR_FLAG = 0x20000000
 _FD_BRS, _FD_ESI = 1, 2
 _BASE_DIGITS, _EXTENDED_DIGITS = 3, 8
 
-_LINE = re.compile(r"\((\d+)(?:\.(\d*))?\)\s+(\S+)\s+([^\s#]*)#(\S*)(?:\s+(\S+))?")
+_SECONDS_DIGITS = 11  # 3,000 years
+_QUOTED = 40  # characters of what is wrong
+
+_LINE = re.compile(r"\(([0-9]+)(?:\.([0-9]*))?\)\s+(\S+)\s+([^\s#]*)#(\S*)(?:\s+(\S+))?")
 _DATA = re.compile(r"((?:[0-9A-Fa-f]{2}\.?)*)(?:_([9A-Fa-f]))?")
 _REMOTE = re.compile(r"[Rr]([0-8])?(?:_([9A-Fa-f]))?")
 
 
+def _quoted(text: str) -> str:
+    return repr(text if len(text) <= _QUOTED else text[:_QUOTED] + "...")
+
+
 def _time_us(seconds: str, fraction: str | None) -> int:
+    if len(seconds) > _SECONDS_DIGITS:
+        raise FrameError(f"a time of more than {_SECONDS_DIGITS} digits before the point")
     return int(seconds) * 1_000_000 + int((fraction or "")[:6].ljust(6, "0"))
 
 
 def _identifier(text: str) -> tuple[int, bool, bool]:
     """Identifier, extended, error."""
     if not re.fullmatch(r"[0-9A-Fa-f]+", text) or len(text) not in (_BASE_DIGITS, _EXTENDED_DIGITS):
-        raise FrameError(f"identifier {text!r} must have 3 or 8 hexadecimal digits")
+        raise FrameError(f"identifier {_quoted(text)} must have 3 or 8 hexadecimal digits")
     value = int(text, 16)
     if len(text) == _EXTENDED_DIGITS and value & _ERROR_FLAG:
         return value & EXTENDED_ID_MAX, False, True
@@ -42,7 +51,7 @@ def _bytes(text: str) -> tuple[bytes, int]:
     """Data and raw length code."""
     match = _DATA.fullmatch(text)
     if match is None:
-        raise FrameError(f"data {text!r} must be pairs of hexadecimal digits")
+        raise FrameError(f"data {_quoted(text)} must be pairs of hexadecimal digits")
     return bytes.fromhex(match[1].replace(".", "")), int(match[2] or "0", 16)
 
 
@@ -54,7 +63,7 @@ def _direction(text: str | None) -> Direction:
             return "R"
         case "T":
             return "T"
-    raise FrameError(f"{text!r} behind the frame, where only R or T may stand")
+    raise FrameError(f"{_quoted(text)} behind the frame, where only R or T may stand")
 
 
 def parse_line(line: str) -> Frame:
@@ -110,7 +119,7 @@ def format_frame(frame: Frame) -> str:
 def read_log(lines: Iterable[str], name: str, complain: Callable[[str], None]) -> Iterator[Frame]:
     """The frames of a log. A line that is none is passed over and told to complain as `NAME:LINE: what`."""
     for number, line in enumerate(lines, start=1):
-        text = line.strip()
+        text = line.removeprefix("\ufeff").strip() if number == 1 else line.strip()
         if not text or text.startswith("#"):
             continue
         try:

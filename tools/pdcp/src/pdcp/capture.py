@@ -24,6 +24,7 @@ __all__ = ["Complain", "from_message", "open_bus", "open_frames", "play", "read_
 Complain = Callable[[str], None]
 
 CONNECT_S = 3.0
+LOOK = 512  # bytes of a file: a log has no 0 among them
 
 _SOCKETCAN = 227
 _EXTENDED_FLAG, _REMOTE_FLAG, _ERROR_FLAG = 0x80000000, 0x40000000, 0x20000000
@@ -280,6 +281,8 @@ def _read_any(stream: io.BufferedReader, name: str, complain: Complain) -> Itera
     start = stream.peek(4)[:4]
     if start == _SECTION or start in _PCAP_MAGICS:
         yield from read_capture(stream, name, complain)
+    elif b"\0" in stream.peek(LOOK)[:LOOK]:
+        complain(f"{name}: neither a log of candump -L nor pcap nor pcapng")
     else:
         lines = (line.decode("utf-8", "replace") for line in stream)
         yield from read_log(lines, name, complain)
@@ -321,6 +324,15 @@ def from_message(message: can.Message, interface: str) -> Frame:
         interface=interface,
         direction="R" if message.is_rx else "T",
     )
+
+
+def is_sendable(bus: can.BusABC, interface: str, frame: Frame) -> bool:
+    """Can this bus carry the frame as it is? python-can sends some that it cannot as other frames."""
+    if frame.error:
+        return False
+    if frame.fd:
+        return bus.protocol is not can.CanProtocol.CAN_20
+    return not (frame.remote and interface == "socketcand")
 
 
 def to_message(frame: Frame) -> can.Message:

@@ -44,7 +44,8 @@ _NAMES: dict[int, str] = {
 _NAMES[Code.OWNER_TYPE], _NAMES[Code.OWNER_PROFILE] = "owner_type", "owner_profile"
 _CODES = {name: code for code, name in _NAMES.items()}
 _VALUE_CODES = {name: code for code, name in _VALUES.items()}
-_CODE_KEY = re.compile(r"code_(\d{1,3})")
+_CODE_KEY = re.compile(r"code_([0-9]{1,3})")
+LIST_MAX = 0xFFFF  # configurations, or links of one
 _DECIMAL = {
     Code.CHANNEL_INDEX,
     Code.CONFIGURATIONS,
@@ -334,6 +335,8 @@ def _items(node: yaml.Node, what: str) -> list[tuple[str, yaml.Node, yaml.Node]]
 def _list(node: yaml.Node, what: str) -> list[yaml.Node]:
     if not isinstance(node, yaml.SequenceNode):
         raise _fail(node, f"{what} must be a list")
+    if len(node.value) > LIST_MAX:
+        raise _fail(node, f"{what} has {len(node.value)} items, more than {LIST_MAX}")
     return list(node.value)
 
 
@@ -410,9 +413,19 @@ def _rest_bytes(node: yaml.Node) -> bytes:
         raise _fail(node, "rest must be bytes in hexadecimal") from None
 
 
+class _Loader(yaml.SafeLoader):
+    """Without aliases: a few lines with them stand for millions."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        if self.check_event(yaml.AliasEvent):
+            mark = self.peek_event().start_mark  # type: ignore[no-untyped-call]
+            raise yaml.MarkedYAMLError(problem="an alias, which is not allowed here", problem_mark=mark)
+        return super().compose_node(parent, index)
+
+
 def _compose(text: str) -> yaml.Node:
     try:
-        node = yaml.compose(text, Loader=yaml.SafeLoader)
+        node = yaml.compose(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         line = error.problem_mark.line + 1 if error.problem_mark else 1
         raise TlvError(f"line {line}: {error.problem or error.context or 'no YAML'}") from None

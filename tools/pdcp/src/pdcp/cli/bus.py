@@ -1,6 +1,5 @@
 """The commands that look at the CAN bus itself: dump, busload, record, replay, and the words of profiles."""
 
-import json
 import sys
 import time
 from collections.abc import Iterator
@@ -15,7 +14,7 @@ from rich.table import Table
 
 from ..busload import BusLoad, Summary, Window
 from ..candump import format_frame
-from ..capture import open_bus, open_frames, play, read_bus, to_message
+from ..capture import is_sendable, open_bus, open_frames, play, read_bus, to_message
 from ..decode import Decoder, format_line, to_json
 from ..frames import Frame
 from ..profiles import Profile, parse_profile, profile_name, profiles
@@ -24,8 +23,10 @@ from .common import (
     JsonOption,
     Status,
     UsageFault,
+    json_text,
     new_console,
     new_table,
+    one_line,
     reason,
     show,
     waiting,
@@ -33,6 +34,7 @@ from .common import (
 )
 from .consent import ForceOption, may_overwrite
 
+COMPLAINTS_TOLD = 10  # of one file or bus
 SEND_PATIENCE_S = 1.0  # a full transmit queue empties meanwhile
 
 _FILE_HELP = "Log of candump -L, pcap or pcapng; - is standard input."
@@ -59,7 +61,10 @@ class Complaints:
 
     def __call__(self, text: str) -> None:
         self.count += 1
-        sys.stderr.write(f"pdcp: {text}\n")
+        if self.count <= COMPLAINTS_TOLD:
+            sys.stderr.write(f"pdcp: {one_line(text)}\n")
+        elif self.count == COMPLAINTS_TOLD + 1:
+            sys.stderr.write("pdcp: others like this are only counted\n")
 
     def check(self) -> None:
         if self.count:
@@ -155,7 +160,7 @@ def dump(
     for frame in source.frames():
         if frame is not None:
             decoded = decoder.decode(frame)
-            line = json.dumps(to_json(decoded), ensure_ascii=False) if objects else format_line(decoded)
+            line = json_text(to_json(decoded)) if objects else format_line(decoded)
             sys.stdout.write(line + "\n")
         if source.is_live:
             sys.stdout.flush()
@@ -322,22 +327,27 @@ def replay(
     no_wait: Annotated[bool, typer.Option("--no-wait", help="Send as fast as the bus takes it.")] = False,
 ) -> None:
     """Send the frames of a log to a bus, with the times between them. All frames are sent, whoever sent them before.
-    Error frames cannot be sent: they are passed over and told.
+    What the bus cannot carry is passed over and told: error frames, CAN FD where it is not switched on, and remote
+    frames over socketcand.
     """
     complaints = Complaints()
     with _open_file(file, complaints) as found:
         frames = list(found)
-    sound = [frame for frame in frames if not frame.error]
-    for frame in frames:
-        if frame.error:
-            complaints(f"{file}: the error frame at {frame.time_us / 1_000_000:.6f} s cannot be sent")
-    with _bus(interface, channel, option) as bus, waiting("replay", len(sound)) as step:
+    with _bus(interface, channel, option) as bus:
+        sound = []
+        for frame in frames:
+            if is_sendable(bus, interface, frame):
+                sound.append(frame)
+            else:
+                kind = "CAN FD" if frame.fd else frame.kind
+                complaints(f"{file}: the {kind} frame at {frame.time_us / 1_000_000:.6f} s cannot be sent")
+        with waiting("replay", len(sound)) as step:
 
-        def send(frame: Frame) -> None:
-            _send(bus, frame)
-            step()
+            def send(frame: Frame) -> None:
+                _send(bus, frame)
+                step()
 
-        play(sound, send, None if no_wait else speed)
+            play(sound, send, None if no_wait else speed)
     sys.stderr.write(f"{len(sound)} frames\n")
     complaints.check()
 

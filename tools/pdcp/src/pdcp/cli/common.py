@@ -25,6 +25,7 @@ from ..messages import FormatError
 
 PIPE_WIDTH = 500  # columns: a row stays one line where no terminal limits it
 PROGRESS_AFTER_S = 1.0
+LINE_MAX = 400  # characters of a complaint
 
 Json = dict[str, Any]
 
@@ -130,10 +131,15 @@ def new_table(title: str = "") -> Table:
     )
 
 
+def json_text(data: object, indent: int | None = None) -> str:
+    """JSON that is safe for a terminal: letters stand as they are, what is not printable is escaped."""
+    text = json.dumps(data, ensure_ascii=False, indent=indent)
+    return "".join(each if each.isprintable() or each == "\n" else json.dumps(each)[1:-1] for each in text)
+
+
 def print_json(data: object) -> None:
     """One JSON document, indented on a terminal, one line otherwise."""
-    json.dump(data, sys.stdout, ensure_ascii=False, indent=2 if sys.stdout.isatty() else None)
-    sys.stdout.write("\n")
+    sys.stdout.write(json_text(data, indent=2 if sys.stdout.isatty() else None) + "\n")
     sys.stdout.flush()
 
 
@@ -188,9 +194,16 @@ def _wording(error: TyperException) -> str:
     return text.rstrip(".")
 
 
-def _complain(text: str, status: Status) -> int:
+def one_line(text: str) -> str:
+    """A text that may hold anything as one line that is safe for a terminal: control characters and those that turn
+    the direction of writing are escaped, and a long line ends in dots."""
     line = " ".join(text.split())
-    sys.stderr.write(f"pdcp: {line}\n")
+    line = line if len(line) <= LINE_MAX else f"{line[:LINE_MAX]}..."
+    return "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in line)
+
+
+def _complain(text: str, status: Status) -> int:
+    sys.stderr.write(f"pdcp: {one_line(text)}\n")
     return status
 
 

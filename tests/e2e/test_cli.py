@@ -411,7 +411,7 @@ def test_profile_layer(limb_cli: Callable[..., Cli]) -> None:
     assert cli("autoconfig", "now", "--json").json("action") == {"links": 3}
     ends = {(row["output"], row["input"]) for row in cli("links", "--json").json("links")}
     assert ends == {("2:2:4.1", "2:2:5.2"), ("2:2:5.3", "2:2:6.1"), ("2:2:5.5", "2:2:6.2")}
-    assert cli.good("autoconfig", "now").output == "0 links made\n"
+    assert cli.good("autoconfig", "now").output == "0 links made: every terminal input has a link\n"
     assert cli("enforce", "--json").json("action") == {"links": 0}
     cli.good("save")
     assert cli("replace", "--json").json("action") == {"links": 0}
@@ -463,6 +463,20 @@ class Values:
         while values[-1].time_ms <= time_ms:
             values.append(self._next())
         return values
+
+
+@pytest.mark.parametrize(
+    ("name", "devices", "why"),
+    [("d1", (1, 0, 1), "no device has a terminal input"), ("d3", (1, 2, 0), "no free output fits 2:2:6.1, 2:2:6.2")],
+)
+def test_why_no_link_was_made(
+    start: Start, files: dict[str, Path], name: str, devices: tuple[int, ...], why: str
+) -> None:
+    pdcpd = start("--node", files[name])
+    with Client(pdcpd.port()) as client:
+        until(lambda: client.system_info()[:3] == devices, "the device is set up")
+        until(lambda: client.info().profile_state is ProfileState.RUNNING, "the start-up is over")
+    assert Cli(pdcpd.port())("autoconfig", "now", "--json").json("action") == {"links": 0, "why": why}
 
 
 def half_a_second(port: str) -> tuple[int, int]:

@@ -22,6 +22,9 @@ NumberArgument = Annotated[
 ]
 
 
+TERMINAL = 0x0100  # in the type of a channel (profile-layer.md 2)
+
+
 class Switch(StrEnum):
     ON = "on"
     OFF = "off"
@@ -127,10 +130,23 @@ def autoconfig(
     as_json: JsonOption = False,
 ) -> None:
     """Connect terminal channels that have no link: now, or by itself from now on."""
-    if what is SwitchOrNow.NOW:
-        _act(ctx, as_json, Action.AUTOCONFIGURE, "made")
-    else:
+    if what is not SwitchOrNow.NOW:
         _switch(ctx, as_json, FlagName.AUTOCONFIGURE, what is SwitchOrNow.ON)
+        return
+    with connect(ctx) as client, waiting("working"):
+        count = client.action(Action.AUTOCONFIGURE)
+        why = "" if count else _why_none_was_made(client)
+    data = {"links": count} | ({"why": why} if why else {})
+    show(ctx, as_json, data, Text(f"{_links(count)} made" + (f": {why}" if why else "")))
+
+
+def _why_none_was_made(client: Client) -> str:
+    linked = {link.input for link in client.links()}
+    terminal = [each.id for each in client.inputs() if each.type & TERMINAL]
+    bare = [str(each) for each in terminal if each not in linked]
+    if not terminal:
+        return "no device has a terminal input"
+    return f"no free output fits {', '.join(bare)}" if bare else "every terminal input has a link"
 
 
 def flag(

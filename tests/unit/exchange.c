@@ -209,63 +209,44 @@ void exchange_run(exchange_t *x, const exchange_pair_t *pairs)
     exchange_silence(x);
 }
 
-void exchange_add_output(exchange_t *x, const char *out_id)
+void exchange_ask(exchange_t *x, const char *node_id, const char *tx, const char *rx)
 {
-    char set_id[40];
-    char answer[40];
-    (void)snprintf(set_id, sizeof set_id, "311#04 05 01 %s", out_id);
-    (void)snprintf(answer, sizeof answer, "211#84 01 05 01 %s", out_id);
-    const exchange_pair_t pairs[] = {
-        {"311#81 11 0200 0200 0400", NULL},
-        {"311#03 01 00", "211#83 01 01 00 0200 0200"},
-        {"311#03 02 00", "211#83 01 02 00 0400"},
-        {"311#03 06 00", "211#83 00 06 00"},
-        {"311#03 0B 00", "211#83 01 0B 00 6400"},
-        {"311#03 0A 00", "211#83 01 0A 00 F401"},
-        {"311#03 09 00", "211#83 01 09 00 01"},
-        {"311#04 04 01 00", "211#84 01 04 01 00"},
-        {"311#03 03 01", "211#83 01 03 01 02"},
-        {"311#03 01 01", "211#83 01 01 01 0050 2021"},
-        {"311#03 09 01", "211#83 00 09 01"},
-        {"311#03 0A 01", "211#83 00 0A 01"},
-        {set_id, answer},
-        {NULL, NULL},
-    };
-    exchange_rx(x, "611#01 0200 0200 0400");
-    exchange_pairs(x, pairs);
-    exchange_rx(x, "011#0A");
+    char text[40];
+    (void)snprintf(text, sizeof text, "3%s#%s", node_id, tx);
+    exchange_tx(x, text);
+    (void)snprintf(text, sizeof text, "2%s#%s", node_id, rx);
+    exchange_rx(x, text);
 }
 
-void exchange_set_up_input(exchange_t *x, const char *vid_pid, const char *serial, const char *type)
+void exchange_ask_all(exchange_t *x, const char *node_id, const exchange_pair_t *pairs)
 {
-    const exchange_pair_t pairs[] = {
-        {"312#81 12 0200 0200 0600", NULL},
-        {"312#03 01 00", "212#83 01 01 00 0200 0200"},
-        {"312#03 02 00", "212#83 01 02 00 0600"},
-        {"312#03 06 00", "212#83 00 06 00"},
-        {"312#03 0B 00", "212#83 01 0B 00 6400"},
-        {"312#03 0A 00", "212#83 01 0A 00 F401"},
-        {"312#03 09 00", "212#83 01 09 00 01"},
-        {"312#04 04 01 00", "212#84 01 04 01 00"},
-        {"312#03 03 01", "212#83 01 03 01 01"},
-        {"312#03 01 01", "212#83 01 01 01 0053 1011"},
-        {"312#03 05 01", vid_pid},
-        {"312#03 06 01", serial},
-        {"312#03 08 01", type},
-        {"312#03 09 01", "212#83 00 09 01"},
-        {"312#03 0A 01", "212#83 00 0A 01"},
-        {"312#03 0B 01", "212#83 01 0B 01 1011"},
-        {NULL, NULL},
-    };
-    exchange_rx(x, "612#01 0200 0200 0600");
-    exchange_pairs(x, pairs);
+    for (; pairs->tx != NULL; pairs++) {
+        exchange_ask(x, node_id, pairs->tx, pairs->rx);
+    }
 }
 
-void exchange_add_input(exchange_t *x)
+void exchange_update(exchange_t *x, const char *vid_pid, const char *serial)
 {
-    exchange_set_up_input(x, "212#83 01 05 01 FFFF FFFF", "212#83 01 06 01 FFFF FF",
-                          "212#83 01 08 01 0000 0000");
-    exchange_rx(x, "012#0A");
+    exchange_rx(x, "212#0F 01");
+    exchange_ask(x, "12", "03 05 01", vid_pid);
+    exchange_ask(x, "12", "03 06 01", serial);
+}
+
+static void lose(exchange_t *x, const char *beacon_of_the_other)
+{
+    exchange_pass(x, 1000);
+    exchange_rx(x, beacon_of_the_other);
+    exchange_pass(x, 500);
+}
+
+void exchange_lose_output(exchange_t *x)
+{
+    lose(x, "012#0A");
+}
+
+void exchange_lose_input(exchange_t *x)
+{
+    lose(x, "011#0A");
 }
 
 uint8_t exchange_output(const exchange_t *x)

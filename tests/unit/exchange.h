@@ -76,13 +76,21 @@ void exchange_pairs(exchange_t *x, const exchange_pair_t *pairs);
 /* The same, and nothing leaves behind them. */
 void exchange_run(exchange_t *x, const exchange_pair_t *pairs);
 
+/* The same with one device: what it is asked and what it answers, without the identifiers. "03 01 00" to "11"
+ * is 311#03 01 00; the answer comes as 211#. */
+void exchange_ask(exchange_t *x, const char *node_id, const char *tx, const char *rx);
+void exchange_ask_all(exchange_t *x, const char *node_id, const exchange_pair_t *pairs);
+
 /* Binds and sets up device 0002:0002:0004 as id 11h: one output, index 1, type 5000h, profile 2120h, gets
  * node id FEh if that is free (out_id). And device 0002:0002:0006 as id 12h: one input, index 1, type 5300h,
  * profile 1110h, unconnected. Both have beaconed. */
 void exchange_add_output(exchange_t *x, const char *out_id);
 void exchange_add_input(exchange_t *x);
 
-/* Binds and sets up the device of that input, which answers 5, 6 and 8 with these texts; no beacon. */
+/* Device 0002:0002:0007 as id 13h, with the same input. */
+void exchange_add_second_input(exchange_t *x);
+
+/* Binds and sets up the device of that input, which answers 5, 6 and 8 with these, "83 00 05 01"; no beacon. */
 void exchange_set_up_input(exchange_t *x, const char *vid_pid, const char *serial, const char *type);
 
 /* Starts with both devices, the output with node id FEh, shortly before the time runs over. */
@@ -92,13 +100,30 @@ void exchange_start_limb(exchange_t *x);
  * enabled to the output. */
 extern const exchange_pair_t exchange_making[];
 
-/* Device 0003:0003:0009 as id 13h, bound and set up: one output, index 1, which gets node id FDh, or one
- * input, index 1. It answers only what it must. */
-extern const exchange_pair_t exchange_third_output[];
-extern const exchange_pair_t exchange_third_input[];
+/* That input being told to be silent; and to forget its source as well. The output is not in it. */
+extern const exchange_pair_t exchange_silencing[];
+extern const exchange_pair_t exchange_removing[];
 
-/* The device of exchange_add_output being set up again, behind its grant. It answers only what it must. */
-extern const exchange_pair_t exchange_first_again[];
+/* That input asks for the link to the source that it names: Update Data Channel, and what it answers when it is
+ * asked for 5 and 6, "83 01 05 01 0200 0200". */
+void exchange_update(exchange_t *x, const char *vid_pid, const char *serial);
+
+/* The device of that output, or that input, is lost; the other one beacons. */
+void exchange_lose_output(exchange_t *x);
+void exchange_lose_input(exchange_t *x);
+
+/* A device is bound. identity: its VID, PID and serial number, "0300 0300 0900". */
+void exchange_bind(exchange_t *x, const char *node_id, const char *identity);
+
+/* The setup of a device that answers only what it must (pdcp-bus.md 6): what it is asked itself, the last its
+ * number of channels, and then what it is asked about one output or one input, index 1. */
+void exchange_set_up_device(exchange_t *x, const char *node_id, const char *identity, const char *channels);
+void exchange_set_up_channel(exchange_t *x, const char *node_id, const char *out_id); /* NULL: an input */
+
+/* Binds and sets up such a device: 0003:0003:0009 as id 13h, with one output, which gets node id FDh, or with
+ * one input. No beacon. */
+void exchange_add_third_output(exchange_t *x);
+void exchange_add_third_input(exchange_t *x);
 
 /* Channel numbers of that output and that input, and the input's entry. */
 uint8_t exchange_output(const exchange_t *x);

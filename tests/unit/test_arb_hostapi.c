@@ -441,33 +441,6 @@ static void test_a_reset_and_the_standby(void)
 
 /* --- links --- */
 
-/* Device 0002:0002:0007, id 13h, like exchange_add_input's. */
-static void add_second_input(void)
-{
-    static const exchange_pair_t pairs[] = {
-        {"313#81 13 0200 0200 0700", NULL},
-        {"313#03 01 00", "213#83 01 01 00 0200 0200"},
-        {"313#03 02 00", "213#83 01 02 00 0700"},
-        {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 01 0B 00 6400"},
-        {"313#03 0A 00", "213#83 01 0A 00 F401"},
-        {"313#03 09 00", "213#83 01 09 00 01"},
-        {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 01"},
-        {"313#03 01 01", "213#83 01 01 01 0053 1011"},
-        {"313#03 05 01", "213#83 01 05 01 FFFF FFFF"},
-        {"313#03 06 01", "213#83 01 06 01 FFFF FF"},
-        {"313#03 08 01", "213#83 01 08 01 0000 0000"},
-        {"313#03 09 01", "213#83 00 09 01"},
-        {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#03 0B 01", "213#83 01 0B 01 1011"},
-        {NULL, NULL},
-    };
-    exchange_rx(&x, "613#01 0200 0200 0700");
-    exchange_pairs(&x, pairs);
-    exchange_rx(&x, "013#0A");
-}
-
 static pdcp_channel_t *channel(uint8_t place)
 {
     pdcp_tables_t *tables = &x.arb->bus.tables;
@@ -478,7 +451,7 @@ static pdcp_channel_t *channel(uint8_t place)
 static void test_sole_access(void)
 {
     add_devices();
-    add_second_input();
+    exchange_add_second_input(&x);
     channel(1)->link = PDCP_LINK_INACTIVE; /* remembered: it comes back */
     channel(1)->source.identity = x.arb->bus.tables.devices[0].identity;
     channel(1)->source.index = 1;
@@ -505,7 +478,7 @@ static void remember_link(uint8_t place, uint8_t status)
 static void test_sole_access_of_a_link_that_rests(void)
 {
     add_devices();
-    add_second_input();
+    exchange_add_second_input(&x);
     remember_link(1, PDCP_LINK_INACTIVE);
     remember_link(2, PDCP_LINK_ACTIVE);
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
@@ -535,7 +508,7 @@ static void test_sole_access_of_a_link_that_waits(void)
         {NULL, NULL},
     };
     add_devices();
-    add_second_input();
+    exchange_add_second_input(&x);
     exchange_rx(&x, "213#0F 01");
     exchange_tx(&x, "313#03 05 01");
     ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
@@ -561,7 +534,7 @@ static void test_an_output_without_a_node_id(void)
 static void test_an_output_for_its_own_device(void)
 {
     add_devices();
-    add_second_input();
+    exchange_add_second_input(&x);
     channel(2)->link = PDCP_LINK_INACTIVE; /* another input has it for itself: that comes second */
     channel(2)->source.identity = x.arb->bus.tables.devices[0].identity;
     channel(2)->source.index = 1;

@@ -77,11 +77,6 @@ static void make_link(void)
 /* Also which output it was, when a link is gone. */
 static void test_links_change(void)
 {
-    static const exchange_pair_t removing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01"},        {"312#04 07 01 0000", "212#84 01 07 01"},
-        {"312#04 08 01 0000 0000", "212#84 01 08 01"}, {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
-        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"}, {NULL, NULL},
-    };
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
     subscribe(0x04);
@@ -89,7 +84,7 @@ static void test_links_change(void)
     hostlink_answer(0x2308, 7, BYTES(2)); /* the answer goes first */
     expect_event(BYTES(3, LATER, DEV_OUT, 1, DEV_IN, 1, 2));
     hostlink_ask(&x, 0x2410, 8, BYTES(DEV_IN, 1));
-    exchange_pairs(&x, removing);
+    exchange_pairs(&x, exchange_removing);
     hostlink_answer(0x2411, 8, NULL, 0);
     expect_event(BYTES(3, LATER, DEV_OUT, 1, DEV_IN, 1, 0));
     hostlink_silence();

@@ -339,15 +339,10 @@ static void make_link(void)
 /* Input off, source back to unconnected, output off (pdcp-bus.md 8). */
 static void test_a_link_is_removed(void)
 {
-    static const exchange_pair_t removing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01"},        {"312#04 07 01 0000", "212#84 01 07 01"},
-        {"312#04 08 01 0000 0000", "212#84 01 08 01"}, {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
-        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"}, {NULL, NULL},
-    };
     make_link();
     ask(0x2410, BYTES(DEV_IN, 1));
     hostlink_silence();
-    exchange_pairs(&x, removing);
+    exchange_pairs(&x, exchange_removing);
     expect(0x2411, NULL, 0);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
@@ -375,12 +370,6 @@ static void live(uint32_t ms)
 /* Auto-save is due while the plan for a new device waits for another one's setup: it comes after the plan. */
 static void test_auto_save_waits_for_the_planner(void)
 {
-    static const exchange_pair_t third[] = {
-        {"313#81 13 0300 0300 0900", NULL},       {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"}, {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},      {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 00"},   {NULL, NULL},
-    };
     ask(0x2404, BYTES(0x04));
     expect(0x2405, NULL, 0);
     make_link();
@@ -388,8 +377,8 @@ static void test_auto_save_waits_for_the_planner(void)
     live(4800);
     exchange_rx(&x, "614#01 0300 0300 0A00"); /* and does not answer */
     (void)exchange_drain(&x);
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_pairs(&x, third);
+    exchange_bind(&x, "13", "0300 0300 0900");
+    exchange_set_up_device(&x, "13", "0300 0300 0900", "00");
     TEST_ASSERT_TRUE(arb_limb_is_busy(&app.limb));
     live(made_ms + 5100 - x.now_ms);
     TEST_ASSERT_TRUE(arb_limb_is_busy(&app.limb));

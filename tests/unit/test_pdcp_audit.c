@@ -253,8 +253,8 @@ static void link_second_input(void)
         {"313#04 08 01 0050 2021", "213#84 01 08 01"}, {"313#04 07 01 11 FE", "213#84 01 07 01"},
         {"313#04 04 01 01", "213#84 01 04 01"},        {NULL, NULL},
     };
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, exchange_third_input);
+    exchange_add_third_input(&x);
+    exchange_silence(&x);
     exchange_rx(&x, "013#0A");
     TEST_ASSERT_EQUAL(
         PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
@@ -314,15 +314,6 @@ static void test_an_answer_that_was_overtaken(void)
 /* The link is taken away after the question. */
 static void test_an_answer_about_a_link_that_is_gone(void)
 {
-    static const exchange_pair_t removing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01"},
-        {"312#04 07 01 0000", "212#84 01 07 01"},
-        {"312#04 08 01 0000 0000", "212#84 01 08 01"},
-        {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
-        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"},
-        {"311#04 04 01 00", "211#84 01 04 01"},
-        {NULL, NULL},
-    };
     begin(false);
     ask("311#03 04 01", "211#83 01 04 01 01");
     exchange_pass(&x, 60);
@@ -330,7 +321,10 @@ static void test_an_answer_about_a_link_that_is_gone(void)
     TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
     exchange_silence(&x);
     exchange_rx(&x, "212#83 01 04 01 00");
-    exchange_run(&x, removing);
+    exchange_pairs(&x, exchange_removing);
+    exchange_tx(&x, "311#04 04 01 00");
+    exchange_rx(&x, "211#84 01 04 01");
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(0, exchange_count(&x, PDCP_EVENT_AUDIT));
 }
 
@@ -338,22 +332,16 @@ static void test_an_answer_about_a_link_that_is_gone(void)
 static void test_everything_else_comes_first(void)
 {
     begin(false);
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_tx(&x, "313#81 13 0300 0300 0900");
+    exchange_bind(&x, "13", "0300 0300 0900");
     exchange_tx(&x, "313#03 01 00");
     exchange_pass(&x, 90);
     exchange_silence(&x);
     exchange_rx(&x, "213#83 01 01 00 0300 0300");
-    exchange_tx(&x, "313#03 02 00");
-    exchange_rx(&x, "213#83 01 02 00 0900");
-    exchange_tx(&x, "313#03 06 00");
-    exchange_rx(&x, "213#83 00 06 00");
-    exchange_tx(&x, "313#03 0B 00");
-    exchange_rx(&x, "213#83 00 0B 00");
-    exchange_tx(&x, "313#03 0A 00");
-    exchange_rx(&x, "213#83 00 0A 00");
-    exchange_tx(&x, "313#03 09 00");
-    exchange_rx(&x, "213#83 01 09 00 00"); /* no channels: it is set up */
+    exchange_ask(&x, "13", "03 02 00", "83 01 02 00 0900");
+    exchange_ask(&x, "13", "03 06 00", "83 00 06 00");
+    exchange_ask(&x, "13", "03 0B 00", "83 00 0B 00");
+    exchange_ask(&x, "13", "03 0A 00", "83 00 0A 00");
+    exchange_ask(&x, "13", "03 09 00", "83 01 09 00 00"); /* no channels: it is set up */
     exchange_pass(&x, 30);
     exchange_tx(&x, "311#03 04 01");
     exchange_rx(&x, "211#83 01 04 01 01");
@@ -452,10 +440,7 @@ static void test_a_channel_without_a_link_goes_first_too(void)
     exchange_pass(&x, 60);
     exchange_tx(&x, "312#03 04 01");
     exchange_rx(&x, "212#83 01 04 01 01");
-    exchange_tx(&x, "312#04 04 01 00");
-    exchange_rx(&x, "212#84 01 04 01");
-    exchange_tx(&x, "312#04 07 01 0000");
-    exchange_rx(&x, "212#84 01 07 01");
+    exchange_pairs(&x, exchange_silencing);
     TEST_ASSERT_EQUAL(exchange_input(&x), exchange_last(&x, PDCP_EVENT_AUDIT)->channel);
     TEST_ASSERT_EQUAL(4, exchange_last(&x, PDCP_EVENT_AUDIT)->status);
 }

@@ -19,6 +19,15 @@ static void make_link(void)
     exchange_run(&x, exchange_making);
 }
 
+/* The first steps of making the link. */
+static void make_steps(int count)
+{
+    for (int i = 0; i < count; i++) {
+        exchange_tx(&x, exchange_making[i].tx);
+        exchange_rx(&x, exchange_making[i].rx);
+    }
+}
+
 static void test_a_link_is_made_in_order(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
@@ -74,10 +83,7 @@ static const char *const refusals[] = {
 static void fail_at(int step)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    for (int i = 0; i < step; i++) {
-        exchange_tx(&x, exchange_making[i].tx);
-        exchange_rx(&x, exchange_making[i].rx);
-    }
+    make_steps(step);
     exchange_tx(&x, exchange_making[step].tx);
     exchange_rx(&x, refusals[step]);
     for (int i = step; i >= 0; i--) {
@@ -136,8 +142,7 @@ static void test_an_input_without_parameter_8_is_linked(void)
 static void test_silence_in_the_middle_ends_the_link(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    exchange_tx(&x, exchange_making[0].tx);
-    exchange_rx(&x, exchange_making[0].rx);
+    make_steps(1);
     for (int i = 0; i < 3; i++) {
         exchange_tx(&x, exchange_making[1].tx);
         exchange_pass(&x, 100);
@@ -160,20 +165,14 @@ static void test_a_lost_answer_is_repeated_and_the_link_made(void)
 /* Removing: input off, source back to unconnected; the output off when its last link goes. */
 static void test_a_link_is_removed(void)
 {
-    static const exchange_pair_t removing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01 00"},
-        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
-        {"312#04 08 01 0000 0000", "212#84 01 08 01 0000 0000"},
-        {"312#04 06 01 FFFF FF", "212#84 01 06 01 FFFF FF"},
-        {"312#04 05 01 FFFF FFFF", "212#84 01 05 01 FFFF FFFF"},
-        {"311#04 04 01 00", "211#84 01 04 01 00"},
-        {NULL, NULL},
-    };
     make_link();
     TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, exchange_output(&x)));
     TEST_ASSERT_FALSE(pdcp_arb_disconnect(x.arb, PDCP_NONE));
     TEST_ASSERT_TRUE(pdcp_arb_disconnect(x.arb, exchange_input(&x)));
-    exchange_run(&x, removing);
+    exchange_pairs(&x, exchange_removing);
+    exchange_tx(&x, "311#04 04 01 00");
+    exchange_rx(&x, "211#84 01 04 01");
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
 }
@@ -181,17 +180,10 @@ static void test_a_link_is_removed(void)
 /* D-BUS-14: the source is lost: inactive at once, transfer enabled 0, node ids 0 0; 5, 6 and 8 stay. */
 static void test_a_lost_source_is_silenced(void)
 {
-    static const exchange_pair_t silencing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01 00"},
-        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
-        {NULL, NULL},
-    };
     make_link();
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "012#0A");
-    exchange_pass(&x, 500);
+    exchange_lose_output(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
-    exchange_run(&x, silencing);
+    exchange_run(&x, exchange_silencing);
     TEST_ASSERT_EQUAL(4, exchange_input_entry(&x)->source.identity.sn);
     TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables)); /* inactive links count */
 }
@@ -200,9 +192,7 @@ static void test_a_lost_source_is_silenced(void)
 static void test_silencing_is_repeated_until_it_is_answered(void)
 {
     make_link();
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "012#0A");
-    exchange_pass(&x, 500);
+    exchange_lose_output(&x);
     for (int i = 0; i < 6; i++) {
         exchange_tx(&x, "312#04 04 01 00");
         exchange_silence(&x);
@@ -221,9 +211,7 @@ static void test_silencing_is_repeated_until_it_is_answered(void)
 static void test_a_lost_input_disables_its_output(void)
 {
     make_link();
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "011#0A");
-    exchange_pass(&x, 500);
+    exchange_lose_input(&x);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01 00");
     exchange_silence(&x);
@@ -234,16 +222,11 @@ static void test_a_lost_input_disables_its_output(void)
 static void test_a_returning_source_gets_its_links_back(void)
 {
     make_link();
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "012#0A");
-    exchange_pass(&x, 500);
-    exchange_tx(&x, "312#04 04 01 00");
-    exchange_rx(&x, "212#84 01 04 01 00");
-    exchange_tx(&x, "312#04 07 01 00 00");
-    exchange_rx(&x, "212#84 01 07 01 00 00");
-    exchange_rx(&x, "611#01 0200 0200 0400");
-    exchange_tx(&x, "311#81 11 0200 0200 0400");
-    exchange_pairs(&x, exchange_first_again);
+    exchange_lose_output(&x);
+    exchange_pairs(&x, exchange_silencing);
+    exchange_bind(&x, "11", "0200 0200 0400");
+    exchange_set_up_device(&x, "11", "0200 0200 0400", "01");
+    exchange_set_up_channel(&x, "11", "FE");
     exchange_run(&x, exchange_making); /* and at once its link */
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
@@ -252,11 +235,6 @@ static void test_a_returning_source_gets_its_links_back(void)
  * heard, and the link is remembered by identity. */
 static void test_a_link_outlives_the_ids_of_its_source(void)
 {
-    static const exchange_pair_t silencing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01 00"},
-        {"312#04 07 01 00 00", "212#84 01 07 01 00 00"},
-        {NULL, NULL},
-    };
     static const exchange_pair_t making_again[] = {
         {"312#04 05 01 0200 0200", "212#84 01 05 01"},
         {"312#04 06 01 0400 01", "212#84 01 06 01"},
@@ -271,7 +249,7 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
         exchange_pass(&x, 500);
         exchange_rx(&x, "012#0A");
         if (i == 2) {
-            exchange_run(&x, silencing);
+            exchange_run(&x, exchange_silencing);
         }
         exchange_silence(&x);
     }
@@ -286,15 +264,8 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
 /* pdcp-bus.md 7: the source that 5 and 6 name is bound: linked, and answered success when that is done. */
 static void test_update_data_channel_links(void)
 {
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, "212#83 01 05 01 0200 0200");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 0400 01");
-    for (int i = 0; exchange_making[i].tx != NULL; i++) {
-        exchange_tx(&x, exchange_making[i].tx);
-        exchange_rx(&x, exchange_making[i].rx);
-    }
+    exchange_update(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01");
+    exchange_pairs(&x, exchange_making);
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
@@ -304,11 +275,7 @@ static void test_update_data_channel_links(void)
 static void test_update_data_channel_of_an_active_link(void)
 {
     make_link();
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, "212#83 01 05 01 0200 0200");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_update(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01");
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
@@ -317,30 +284,13 @@ static void test_update_data_channel_of_an_active_link(void)
 /* Not present: remembered as inactive, answered failure, realised when the source appears. */
 static void test_update_data_channel_waits_for_its_source(void)
 {
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, "212#83 01 05 01 0300 0300");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 0900 01");
+    exchange_update(&x, "83 01 05 01 0300 0300", "83 01 06 01 0900 01");
     exchange_tx(&x, "312#8F 00 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(1, pdcp_tables_count_links(&x.arb->bus.tables));
 
-    static const exchange_pair_t pairs[] = {
-        {"313#81 13 0300 0300 0900", NULL},
-        {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"},
-        {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},
-        {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 01"},
-        {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 02"},
-        {"313#03 01 01", "213#83 01 01 01 0050 2021"},
-        {"313#03 09 01", "213#83 00 09 01"},
-        {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#04 05 01 FD", "213#84 01 05 01 FD"},
+    static const exchange_pair_t making[] = {
         {"312#04 05 01 0300 0300", "212#84 01 05 01 0300 0300"},
         {"312#04 06 01 0900 01", "212#84 01 06 01 0900 01"},
         {"312#04 08 01 0050 2021", "212#84 01 08 01 0050 2021"},
@@ -349,8 +299,8 @@ static void test_update_data_channel_waits_for_its_source(void)
         {"313#04 04 01 01", "213#84 01 04 01 01"},
         {NULL, NULL},
     };
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, pairs);
+    exchange_add_third_output(&x);
+    exchange_run(&x, making);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
@@ -360,11 +310,7 @@ static void test_update_data_channel_of_what_is_no_input(void)
     exchange_tx(&x, "311#8F 00 01");
     exchange_rx(&x, "212#0F 02"); /* does not exist */
     exchange_tx(&x, "312#8F 00 02");
-    exchange_rx(&x, "212#0F 01"); /* unconnected */
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, "212#83 01 05 01 FFFF FFFF");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 FFFF FF");
+    exchange_update(&x, "83 01 05 01 FFFF FFFF", "83 01 06 01 FFFF FF"); /* unconnected */
     exchange_tx(&x, "312#8F 00 01");
     exchange_silence(&x);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
@@ -385,8 +331,8 @@ static void test_a_source_is_replaced(void)
         {NULL, NULL},
     };
     make_link();
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, exchange_third_output);
+    exchange_add_third_output(&x);
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(
         PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), exchange_input(&x)));
     exchange_run(&x, replacing);
@@ -399,10 +345,7 @@ static void test_a_source_is_replaced(void)
 static void test_a_source_lost_in_the_middle_is_undone(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    for (int i = 0; i < 5; i++) {
-        exchange_tx(&x, exchange_making[i].tx);
-        exchange_rx(&x, exchange_making[i].rx);
-    }
+    make_steps(5);
     exchange_tx(&x, exchange_making[5].tx);
     exchange_rx(&x, "611#01 0200 0200 0400"); /* it was reset: any try unanswered shows it */
     exchange_pass(&x, 100);
@@ -442,8 +385,8 @@ static void link_second_input(void)
         {"313#04 04 01 01", "213#84 01 04 01 01"},
         {NULL, NULL},
     };
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, exchange_third_input);
+    exchange_add_third_input(&x);
+    exchange_silence(&x);
     exchange_rx(&x, "013#0A");
     TEST_ASSERT_EQUAL(
         PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), pdcp_tables_channel(&x.arb->bus.tables, 2, 1)));
@@ -491,25 +434,15 @@ static void test_update_data_channel_does_not_end_the_silencing(void)
 {
     make_link();
     pdcp_arb_plan_links(x.arb, true);
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "012#0A");
-    exchange_pass(&x, 500);
+    exchange_lose_output(&x);
     for (int i = 0; i < 4; i++) { /* three tries, and one of those that anything else breaks off */
         exchange_tx(&x, "312#04 04 01 00");
         exchange_silence(&x);
         exchange_pass(&x, i < 3 ? 100 : 50);
     }
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01"); /* D-BUS-38: does it name what it should? */
-    exchange_rx(&x, "212#83 01 05 01 0200 0200");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_update(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01"); /* D-BUS-38: what it should? */
     exchange_tx(&x, "312#8F 00 01");
-    exchange_tx(&x, "312#04 04 01 00");
-    exchange_rx(&x, "212#84 01 04 01 00");
-    exchange_tx(&x, "312#04 07 01 00 00");
-    exchange_rx(&x, "212#84 01 07 01 00 00");
-    exchange_silence(&x);
+    exchange_run(&x, exchange_silencing);
     TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
 }
 
@@ -532,10 +465,7 @@ static void test_a_link_whose_source_has_gone_is_not_made(void)
 static void test_an_answer_that_tells_of_another_value_is_late(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    for (int i = 0; i < 3; i++) {
-        exchange_tx(&x, exchange_making[i].tx);
-        exchange_rx(&x, exchange_making[i].rx);
-    }
+    make_steps(3);
     exchange_tx(&x, "312#04 07 01 11 FE");
     exchange_rx(&x, "212#84 01 07 01 13 FD"); /* another source */
     exchange_silence(&x);

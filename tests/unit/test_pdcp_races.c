@@ -13,16 +13,19 @@ void setUp(void)
 
 void tearDown(void) {}
 
-static const exchange_pair_t to_the_input[] = {
-    {"312#04 05 01 0200 0200", "212#84 01 05 01"}, {"312#04 06 01 0400 01", "212#84 01 06 01"},
-    {"312#04 08 01 0050 2021", "212#84 01 08 01"}, {"312#04 07 01 11 FE", "212#84 01 07 01"},
-    {"312#04 04 01 01", "212#84 01 04 01"},        {NULL, NULL},
-};
+/* All steps but the last, which is to the output. */
+static void make_input(void)
+{
+    for (const exchange_pair_t *pair = exchange_making; pair[1].tx != NULL; pair++) {
+        exchange_tx(&x, pair->tx);
+        exchange_rx(&x, pair->rx);
+    }
+}
 
 static void connect_to_the_last_step(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    exchange_pairs(&x, to_the_input);
+    make_input();
     exchange_tx(&x, "311#04 04 01 01");
 }
 
@@ -82,7 +85,7 @@ static void test_an_output_in_doubt_is_written_again(void)
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_tx(&x, "311#04 04 01 00"); /* the silencing goes on */
     exchange_rx(&x, "211#84 01 04 01");
-    exchange_pairs(&x, to_the_input);
+    make_input();
     exchange_tx(&x, "311#04 04 01 01");
 }
 
@@ -91,7 +94,7 @@ static void test_an_output_in_doubt_is_written_again(void)
 static void test_a_waiting_request_ends_with_its_device(void)
 {
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    exchange_tx(&x, to_the_input[0].tx);
+    exchange_tx(&x, exchange_making[0].tx);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_rx(&x, "611#01 0200 0200 0400");
     exchange_tx(&x, "311#03 01 00");
@@ -108,7 +111,7 @@ static void test_a_request_does_not_wait_for_ever(void)
 {
     x.arb->bus.tables.devices[1].ack_ms = 500;
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
-    exchange_tx(&x, to_the_input[0].tx); /* never answered: 1.5 s */
+    exchange_tx(&x, exchange_making[0].tx); /* never answered: 1.5 s */
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, exchange_output(&x), exchange_input(&x)));
     exchange_step(&x);
     exchange_pass(&x, 999);
@@ -179,26 +182,12 @@ static void test_every_unknown_id_is_told_once_a_second(void)
 /* Update Data Channel during the setup, for what turns out to be an output. */
 static void test_an_update_for_an_output_during_its_setup(void)
 {
-    static const exchange_pair_t before[] = {
-        {"313#81 13 0300 0300 0900", NULL},       {"313#03 01 00", "213#83 01 01 00 0300 0300"},
-        {"313#03 02 00", "213#83 01 02 00 0900"}, {"313#03 06 00", "213#83 00 06 00"},
-        {"313#03 0B 00", "213#83 00 0B 00"},      {"313#03 0A 00", "213#83 00 0A 00"},
-        {"313#03 09 00", "213#83 01 09 00 01"},   {NULL, NULL},
-    };
-    static const exchange_pair_t after[] = {
-        {"313#04 04 01 00", "213#84 01 04 01 00"},
-        {"313#03 03 01", "213#83 01 03 01 02"},
-        {"313#03 01 01", "213#83 01 01 01 0050 2021"},
-        {"313#03 09 01", "213#83 00 09 01"},
-        {"313#03 0A 01", "213#83 00 0A 01"},
-        {"313#04 05 01 FD", "213#84 01 05 01 FD"},
-        {"313#8F 00 01", NULL},
-        {NULL, NULL},
-    };
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_pairs(&x, before);
+    exchange_bind(&x, "13", "0300 0300 0900");
+    exchange_set_up_device(&x, "13", "0300 0300 0900", "01");
     exchange_rx(&x, "213#0F 01");
-    exchange_run(&x, after);
+    exchange_set_up_channel(&x, "13", "FD");
+    exchange_tx(&x, "313#8F 00 01");
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
 }
 
@@ -207,19 +196,11 @@ static void test_an_update_for_an_output_during_its_setup(void)
 static void test_an_update_to_an_absent_source_silences_the_input(void)
 {
     make_link();
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, "212#83 01 05 01 0300 0300");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 0900 01");
+    exchange_update(&x, "83 01 05 01 0300 0300", "83 01 06 01 0900 01");
     exchange_tx(&x, "311#04 04 01 00"); /* by identifier */
     exchange_tx(&x, "312#8F 00 01");
     exchange_rx(&x, "211#84 01 04 01");
-    exchange_tx(&x, "312#04 04 01 00");
-    exchange_rx(&x, "212#84 01 04 01");
-    exchange_tx(&x, "312#04 07 01 0000");
-    exchange_rx(&x, "212#84 01 07 01");
-    exchange_silence(&x);
+    exchange_run(&x, exchange_silencing);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
 }
 
@@ -301,17 +282,11 @@ static void test_a_source_in_pieces(void)
     exchange_tx(&x, "312#8E 01");
     exchange_tx(&x, "312#03 06 01");
     exchange_rx(&x, "212#83 01 06 01 0400 01");
-    exchange_pairs(&x, to_the_input);
+    make_input();
     exchange_tx(&x, "311#04 04 01 01");
 }
 
 /* 2410h: the link is to be taken away. Whatever happens before that has its turn, it is. */
-static const exchange_pair_t removing[] = {
-    {"312#04 04 01 00", "212#84 01 04 01"},        {"312#04 07 01 0000", "212#84 01 07 01"},
-    {"312#04 08 01 0000 0000", "212#84 01 08 01"}, {"312#04 06 01 FFFF FF", "212#84 01 06 01"},
-    {"312#04 05 01 FFFF FFFF", "212#84 01 05 01"}, {NULL, NULL},
-};
-
 static void expect_no_link(void)
 {
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.tables.channels[exchange_input(&x)].link);
@@ -322,8 +297,8 @@ static void expect_no_link(void)
 static void test_a_removal_outlasts_a_link_that_fails(void)
 {
     make_link();
-    exchange_rx(&x, "613#01 0300 0300 0900");
-    exchange_run(&x, exchange_third_output);
+    exchange_add_third_output(&x);
+    exchange_silence(&x);
     TEST_ASSERT_EQUAL(
         PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 2, 1), exchange_input(&x)));
     exchange_tx(&x, "312#04 04 01 00");
@@ -331,7 +306,7 @@ static void test_a_removal_outlasts_a_link_that_fails(void)
     exchange_rx(&x, "212#84 00 04 01"); /* refused: the link that worked would be made anew */
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
-    exchange_run(&x, removing);
+    exchange_run(&x, exchange_removing);
     expect_no_link();
 }
 
@@ -347,7 +322,7 @@ static void test_a_removal_outlasts_an_absent_source(void)
     exchange_tx(&x, "311#04 04 01 00");         /* by identifier */
     exchange_tx(&x, "312#8F 00 01");
     exchange_rx(&x, "211#84 01 04 01");
-    exchange_run(&x, removing);
+    exchange_run(&x, exchange_removing);
     expect_no_link();
 }
 
@@ -369,7 +344,7 @@ static void test_a_removal_outlasts_the_source(void)
     (void)exchange_drain(&x);
     exchange_rx(&x, "212#83 01 06 01 0400 01");
     exchange_tx(&x, "312#8F 00 01");
-    exchange_pairs(&x, removing);
+    exchange_pairs(&x, exchange_removing);
     expect_no_link();
 }
 
@@ -386,7 +361,7 @@ static void test_a_removal_outlasts_an_update(void)
     exchange_tx(&x, "312#8F 01 01");
     exchange_tx(&x, "312#04 04 01 00");
     exchange_rx(&x, "212#84 01 04 01");
-    exchange_pairs(&x, &removing[1]);
+    exchange_pairs(&x, &exchange_removing[1]);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
     exchange_silence(&x);

@@ -16,15 +16,8 @@ void tearDown(void) {}
 /* The source is lost: the link is inactive, the input silenced; 5, 6 and 8 stay. */
 static void lose_source(void)
 {
-    static const exchange_pair_t silencing[] = {
-        {"312#04 04 01 00", "212#84 01 04 01"},
-        {"312#04 07 01 0000", "212#84 01 07 01"},
-        {NULL, NULL},
-    };
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "012#0A");
-    exchange_pass(&x, 500);
-    exchange_run(&x, silencing);
+    exchange_lose_output(&x);
+    exchange_run(&x, exchange_silencing);
     exchange_clear(&x);
 }
 
@@ -41,11 +34,7 @@ static const exchange_pair_t writing[] = {
 static void update(const char *vid_pid, const char *serial)
 {
     pdcp_arb_plan_links(x.arb, true);
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, vid_pid);
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, serial);
+    exchange_update(&x, vid_pid, serial);
 }
 
 static void expect_table(pdcp_link_status_t link, uint16_t sn, uint8_t index)
@@ -62,7 +51,7 @@ static void expect_table(pdcp_link_status_t link, uint16_t sn, uint8_t index)
 static void test_a_device_that_names_another_source_is_told_its_own(void)
 {
     exchange_make_link(&x);
-    update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0900 0900", "83 01 06 01 0400 01");
     exchange_pairs(&x, writing);
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
@@ -72,7 +61,7 @@ static void test_a_device_that_names_another_source_is_told_its_own(void)
 static void test_another_channel_of_its_source_is_another_source(void)
 {
     exchange_make_link(&x);
-    update("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 02");
+    update("83 01 05 01 0200 0200", "83 01 06 01 0400 02");
     exchange_pairs(&x, writing);
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
@@ -82,7 +71,7 @@ static void test_another_channel_of_its_source_is_another_source(void)
 static void test_a_device_that_names_its_source_is_told_nothing(void)
 {
     exchange_make_link(&x);
-    update("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0200 0200", "83 01 06 01 0400 01");
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
     expect_table(PDCP_LINK_ACTIVE, 4, 1);
@@ -100,7 +89,7 @@ static void test_an_inactive_link_is_named_and_not_made(void)
     };
     exchange_make_link(&x);
     lose_source();
-    update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 01");
+    update("83 01 05 01 0900 0900", "83 01 06 01 0700 01");
     exchange_run(&x, naming);
     expect_table(PDCP_LINK_INACTIVE, 4, 1);
     TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
@@ -116,7 +105,7 @@ static const exchange_pair_t unnaming[] = {
 /* D-BUS-7: without a link it names none, although the output that it named is there. */
 static void test_an_input_without_a_link_names_none(void)
 {
-    update("212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0200 0200", "83 01 06 01 0400 01");
     exchange_pairs(&x, unnaming);
     exchange_tx(&x, "312#8F 00 01");
     exchange_silence(&x);
@@ -127,7 +116,7 @@ static void test_an_input_without_a_link_names_none(void)
 static void test_a_device_that_refuses_to_name_its_source_is_answered(void)
 {
     exchange_make_link(&x);
-    update("212#83 00 05 01", "212#83 00 06 01");
+    update("83 00 05 01", "83 00 06 01");
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
     expect_table(PDCP_LINK_ACTIVE, 4, 1);
@@ -136,7 +125,7 @@ static void test_a_device_that_refuses_to_name_its_source_is_answered(void)
 static void test_half_an_answer_is_enough(void)
 {
     exchange_make_link(&x);
-    update("212#83 00 05 01", "212#83 01 06 01 0900 01");
+    update("83 00 05 01", "83 01 06 01 0900 01");
     exchange_pairs(&x, writing);
     exchange_tx(&x, "312#8F 01 01");
     exchange_silence(&x);
@@ -160,7 +149,7 @@ static void test_a_silent_device_is_not_answered(void)
 static void test_what_is_refused_is_left_out(void)
 {
     exchange_make_link(&x);
-    update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0900 0900", "83 01 06 01 0400 01");
     for (const exchange_pair_t *pair = writing; pair->tx != NULL; pair++) {
         char refusal[16] = "";
         for (int i = 0; i < 15; i++) {
@@ -179,7 +168,7 @@ static void test_what_is_refused_is_left_out(void)
 static void test_a_silent_input_does_not_hold_up_its_output(void)
 {
     exchange_make_link(&x);
-    update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0900 0900", "83 01 06 01 0400 01");
     for (int i = 0; i < 3; i++) {
         exchange_tx(&x, "312#04 05 01 0200 0200");
         exchange_pass(&x, 100);
@@ -200,7 +189,7 @@ static void test_a_source_lost_in_the_middle(void)
     exchange_pass(&x, 1000);
     exchange_rx(&x, "012#0A");
     exchange_pass(&x, 499);
-    update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0900 0900", "83 01 06 01 0400 01");
     for (int i = 0; i < 4; i++) {
         exchange_tx(&x, writing[i].tx);
         if (i < 3) {
@@ -211,11 +200,7 @@ static void test_a_source_lost_in_the_middle(void)
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     exchange_rx(&x, writing[3].rx);
     exchange_tx(&x, "312#8F 00 01");
-    exchange_tx(&x, "312#04 04 01 00");
-    exchange_rx(&x, "212#84 01 04 01");
-    exchange_tx(&x, "312#04 07 01 0000");
-    exchange_rx(&x, "212#84 01 07 01");
-    exchange_silence(&x);
+    exchange_run(&x, exchange_silencing);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
 }
@@ -224,7 +209,7 @@ static void test_a_source_lost_in_the_middle(void)
 static void test_an_input_lost_in_the_middle(void)
 {
     exchange_make_link(&x);
-    update("212#83 01 05 01 0900 0900", "212#83 01 06 01 0400 01");
+    update("83 01 05 01 0900 0900", "83 01 06 01 0400 01");
     for (int i = 0; i < 5; i++) {
         exchange_tx(&x, writing[i].tx);
         exchange_rx(&x, writing[i].rx);
@@ -257,8 +242,7 @@ static void test_a_setup_that_finds_another_source(void)
     exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    exchange_set_up_input(&x, "212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03",
-                          "212#83 01 08 01 0050 2021");
+    exchange_set_up_input(&x, "83 01 05 01 0900 0900", "83 01 06 01 0700 03", "83 01 08 01 0050 2021");
     exchange_run(&x, naming);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(4, exchange_input_entry(&x)->source.identity.sn);
@@ -270,8 +254,7 @@ static void test_a_setup_that_finds_another_type(void)
     exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    exchange_set_up_input(&x, "212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01",
-                          "212#83 01 08 01 0050 2022");
+    exchange_set_up_input(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01", "83 01 08 01 0050 2022");
     exchange_run(&x, naming);
 }
 
@@ -280,8 +263,7 @@ static void test_a_setup_that_finds_its_source(void)
     exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    exchange_set_up_input(&x, "212#83 01 05 01 0200 0200", "212#83 01 06 01 0400 01",
-                          "212#83 01 08 01 0050 2021");
+    exchange_set_up_input(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01", "83 01 08 01 0050 2021");
     exchange_silence(&x);
 }
 
@@ -291,7 +273,7 @@ static void test_a_setup_that_is_refused_a_source(void)
     exchange_make_link(&x);
     lose_source();
     exchange_pass(&x, 1500);
-    exchange_set_up_input(&x, "212#83 00 05 01", "212#83 00 06 01", "212#83 00 08 01");
+    exchange_set_up_input(&x, "83 00 05 01", "83 00 06 01", "83 00 08 01");
     exchange_silence(&x);
 }
 
@@ -299,13 +281,10 @@ static void test_a_setup_that_is_refused_a_source(void)
 static void test_a_link_that_is_made_is_not_written_once_more(void)
 {
     exchange_make_link(&x);
-    exchange_pass(&x, 1000);
-    exchange_rx(&x, "011#0A");
-    exchange_pass(&x, 500);
+    exchange_lose_input(&x);
     exchange_tx(&x, "311#04 04 01 00"); /* nobody listens */
     exchange_rx(&x, "211#84 01 04 01");
-    exchange_set_up_input(&x, "212#83 01 05 01 0900 0900", "212#83 01 06 01 0700 03",
-                          "212#83 01 08 01 0050 2021");
+    exchange_set_up_input(&x, "83 01 05 01 0900 0900", "83 01 06 01 0700 03", "83 01 08 01 0050 2021");
     exchange_run(&x, exchange_making);
     TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }

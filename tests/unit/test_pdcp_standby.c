@@ -248,11 +248,7 @@ static void test_a_link_that_was_not_answered_is_tried_again(void)
 {
     exchange_add_output(&x, "FE");
     exchange_add_input(&x);
-    exchange_rx(&x, "212#0F 01");
-    exchange_tx(&x, "312#03 05 01");
-    exchange_rx(&x, "212#83 01 05 01 0200 0200");
-    exchange_tx(&x, "312#03 06 01");
-    exchange_rx(&x, "212#83 01 06 01 0400 01");
+    exchange_update(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01");
     for (int i = 0; i < 3; i++) {
         exchange_tx(&x, "312#04 05 01 0200 0200");
         exchange_pass(&x, 100);

@@ -121,7 +121,9 @@ static void test_a_lost_device_is_released_when_it_is_back(void)
     exchange_pass(&x, 500);
     exchange_silence(&x);
     exchange_rx(&x, "011#0A");
-    exchange_run(&x, exchange_first_again);
+    exchange_set_up_device(&x, "11", "0200 0200 0400", "01");
+    exchange_set_up_channel(&x, "11", "FE");
+    exchange_silence(&x);
     exchange_pass(&x, 10);
     exchange_tx(&x, "311#09");
     exchange_rx(&x, "211#89 01");

@@ -14,8 +14,8 @@ import signal
 import sys
 import time
 from collections import deque
-from collections.abc import Iterator
-from contextlib import ExitStack
+from collections.abc import Callable, Generator, Iterator
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import NamedTuple, NoReturn
 
@@ -39,12 +39,14 @@ NAME_WIDTH = 13
 TRACE_WIDTH = 30
 STEP_S = 0.05  # of a trace
 SETUP_TIMEOUT_S = 15.0
-ONCE_S = (2.0, 4.0, 8.0, 16.0)  # a busy machine lets values wait
+ONCE_LIMIT_S = 30.0  # until values are the sine: a busy machine lets them wait
 ENOUGH = 75  # values at each input to tell whether they are the sine
+JUDGED = 200  # newest values of both inputs, 2 s; they are judged whenever so many more have come:
+JUDGED_STEP = 50
 REPAIRED_ONCE_S = 0.6
 BEFORE_SWAP_S = 8.0  # unless --once
 PULLED_S = 1.0  # between the loss and the replacement
-SILENCE_S = 2.0  # without a value: the demonstration has failed
+SILENCE_S = 5.0  # without a value: the demonstration has failed
 PLAIN_EVERY_S = 0.2
 LATE_MS = 300  # later than others, as a rule: the system lets the sensor wait
 LATE_SHARE = 0.1  # of the values may come later than that
@@ -55,6 +57,9 @@ FULL_RANGE = 255  # of the 8-bit channels that the sine passes through
 DEVICE_DESCRIPTOR = 7
 DEVICE_NODE_ID = 8
 CHANNEL_DESCRIPTOR = 2
+
+
+Values = Generator[Value, None, None]
 
 
 class DemoError(Exception):
@@ -245,7 +250,7 @@ def traced(values: Iterator[Value], traces: dict[int, Trace]) -> Iterator[Value]
         yield value
 
 
-def with_live_view(values: Iterator[Value], traces: dict[int, Trace], console: Console) -> Iterator[Value]:
+def with_live_view(values: Iterator[Value], traces: dict[int, Trace], console: Console) -> Values:
     """Hands the values on while two lines of the terminal follow them."""
     started_s = time.monotonic()
     step_s = started_s
@@ -260,7 +265,7 @@ def with_live_view(values: Iterator[Value], traces: dict[int, Trace], console: C
             yield value
 
 
-def with_plain_lines(values: Iterator[Value], traces: dict[int, Trace], console: Console) -> Iterator[Value]:
+def with_plain_lines(values: Iterator[Value], traces: dict[int, Trace], console: Console) -> Values:
     """Hands the values on and prints a line of them now and then."""
     started_s = time.monotonic()
     next_s = started_s
@@ -349,8 +354,9 @@ def show_limb(limb: Limb, console: Console) -> Names:
     return names
 
 
-def show_values(limb: Limb, names: Names, console: Console, for_s: float) -> list[Value]:
-    """Shows what arrives at the hand, for so long, and returns it."""
+def show_values(limb: Limb, names: Names, console: Console, for_s: float,
+                is_enough: Callable[[deque[Value]], bool] = lambda _: False) -> deque[Value]:
+    """Shows what arrives at the hand, for so long or until it is enough, and returns it."""
     traces = {
         channel: Trace(names.descriptors[ChannelId(limb.hand, channel)], highest)
         for channel, highest in ((WRIST, FULL_RANGE), (GRIP, 1))
@@ -360,8 +366,12 @@ def show_values(limb: Limb, names: Names, console: Console, for_s: float) -> lis
     values = received(limb.pdcpd, limb.hand, time.monotonic() + for_s)
     show = with_live_view if console.is_terminal else with_plain_lines
     kept: deque[Value] = deque(maxlen=KEPT_MAX)
-    kept.extend(show(values, traces, console))
-    return list(kept)
+    with closing(show(values, traces, console)) as shown:
+        for value in shown:
+            kept.append(value)
+            if is_enough(kept):
+                break
+    return kept
 
 
 def next_value(limb: Limb, safe: bool) -> None:
@@ -400,15 +410,19 @@ def swap_sensor(limb: Limb, sensor: Program, console: Console) -> None:
 
 
 def await_sine(limb: Limb, sine: Sine, names: Names, console: Console) -> None:
-    """Shows what arrives until it is the sensor's sine. Fails when it never is."""
-    fault = ""
-    for for_s in ONCE_S:
-        kept = show_values(limb, names, console, for_s)
-        fault = check_values(sine, kept)
-        if not fault:
-            console.print(f"[green]{len(kept)} values have arrived, and they are the sine that D1 sends.[/green]")
-            return
-    raise DemoError(fault)
+    """Shows what arrives until the newest values are the sensor's sine. Fails when they never are."""
+    fault = check_values(sine, [])
+
+    def is_sine(kept: deque[Value]) -> bool:
+        nonlocal fault
+        if len(kept) >= JUDGED and len(kept) % JUDGED_STEP == 0:
+            fault = check_values(sine, list(kept)[-JUDGED:])
+        return not fault
+
+    kept = show_values(limb, names, console, ONCE_LIMIT_S, is_sine)
+    if fault:
+        raise DemoError(check_values(sine, list(kept)[-JUDGED:]) or fault)
+    console.print(f"[green]{len(kept)} values have arrived, and the newest are the sine that D1 sends.[/green]")
 
 
 def run(limb: Limb, console: Console, once: bool) -> None:

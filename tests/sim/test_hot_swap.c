@@ -1,36 +1,19 @@
 /* What a user does to a limb that configures itself (profile-layer.md 4): parts are pulled, put back, added,
- * refuse or are reset; a second arbitrator; the host's actions and flags. The real device role and
- * application in virtual time. */
+ * refuse or are reset; a second arbitrator; any of it in any order. The real device role and application in
+ * virtual time. */
 #include <stdio.h>
 #include <string.h>
 
-#include "limb.h"
+#include "swap.h"
 #include "unity.h"
 
-#define SENSOR "out 5000 2120, signal = sine 0 255 2000, rate_ms = 20"
-#define CONTROLLER                                                                                           \
-    "in 7200 2200; in 5200 2110; out 5000 1100, required = 2, signal = copy 2;"                              \
-    "out 5000 1210, required = 1, signal = copy 1; out 7000 1220, required = 2, signal = copy 2"
-#define HAND "in 5300 1110, terminal_profile = 0x1110; in 7300 1220, terminal_profile = 0x1220"
-
-#define LINKS "1.1>2.2 2.3>3.1 2.5>3.2"
-#define LINKS_SPARE "4.3>3.1 4.5>3.2 1.1>4.2"
-
-enum { SPARE = 3, SEEDS = 3 };
-
-enum { AUTO = ARB_FLAG_AUTOCONFIGURE, SWAP = ARB_FLAG_HOT_SWAP, SAVE = ARB_FLAG_AUTO_SAVE };
+enum { SEEDS = 3 };
 
 static limb_t limb;
 
-/* The parts of acceptance system 2, and a second controller; none is plugged in. */
 void setUp(void)
 {
-    limb_begin(&limb, 1, 0xFFFFFFFFu - 2000u);
-    limb.keeps = true;
-    (void)limb_add(&limb, 4, SENSOR);
-    (void)limb_add(&limb, 5, CONTROLLER);
-    (void)limb_add(&limb, 6, HAND);
-    (void)limb_add(&limb, 7, CONTROLLER);
+    swap_begin(&limb);
 }
 
 void tearDown(void)
@@ -38,56 +21,29 @@ void tearDown(void)
     limb_end(&limb);
 }
 
-static void run_limb(void)
-{
-    limb_plug(&limb, D1, D3);
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 2000);
-}
-
-/* Everything is switched off and on again; the arbitrator then makes up no links anew. */
-static void restart(int first, int last)
-{
-    limb_stop_arbitrator(&limb);
-    for (int i = 0; i < limb.count; i++) {
-        if (limb.parts[i].node != NULL) {
-            limb_power_off(&limb, i);
-        }
-    }
-    limb_run_ms(&limb, 1000);
-    limb.settings.no_autoconfig = true;
-    limb_start_arbitrator(&limb);
-    limb_plug(&limb, first, last);
-}
-
-static void set_flags(uint8_t flags)
-{
-    TEST_ASSERT_EQUAL_HEX16(0x2405, limb_ask(&limb, 0x2404, &flags, 1));
-}
-
 /* --- Pulled and put back --- */
 
 /* Originals come back and replace what stood in for them (D-PRO-6). */
 static void swap_controller(uint32_t away_ms)
 {
-    run_limb();
-    limb_power_on(&limb, SPARE);
+    swap_run(&limb);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_run_ms(&limb, 1000);
-    limb_expect(&limb, LINKS);
-    limb_want(&limb, LINKS_SPARE);
+    limb_expect(&limb, SWAP_LINKS);
+    limb_want(&limb, SWAP_LINKS_SPARE);
     limb_power_off(&limb, D2);
     limb_await(&limb, 2500);
     TEST_ASSERT_TRUE(limb.linked.time_us - limb.lost.time_us <
                      100000 + limb.linked.busy_us - limb.lost.busy_us);
     limb_expect_flow(&limb);
     limb_run_ms(&limb, away_ms);
-    limb_expect(&limb, LINKS_SPARE);
-    limb_want(&limb, LINKS);
+    limb_expect(&limb, SWAP_LINKS_SPARE);
+    limb_want(&limb, SWAP_LINKS);
     limb_power_on(&limb, D2);
     limb_await(&limb, 2500);
     limb_expect_flow(&limb);
     limb_run_ms(&limb, 20000);
-    limb_expect(&limb, LINKS);
+    limb_expect(&limb, SWAP_LINKS);
 }
 
 static void test_the_controller_is_back_within_10_s(void)
@@ -103,12 +59,12 @@ static void test_the_controller_is_back_after_its_ids_were_given_up(void)
 /* Before it is missed: nothing stands in. */
 static void test_the_controller_is_reset_by_itself(void)
 {
-    run_limb();
-    limb_power_on(&limb, SPARE);
+    swap_run(&limb);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_run_ms(&limb, 1000);
     limb_power_off(&limb, D2);
     limb_power_on(&limb, D2);
-    limb_want(&limb, LINKS);
+    limb_want(&limb, SWAP_LINKS);
     for (int ms = 0; ms < 1000; ms++) {
         limb_run_ms(&limb, 1);
         TEST_ASSERT_NULL(strchr(limb.wanted, '4'));
@@ -116,34 +72,34 @@ static void test_the_controller_is_reset_by_itself(void)
         limb_links(&limb, text);
         TEST_ASSERT_NULL_MESSAGE(strstr(text, "4."), text);
     }
-    limb_expect(&limb, LINKS);
+    limb_expect(&limb, SWAP_LINKS);
     limb_expect_flow(&limb);
 }
 
 static void test_a_spare_part_takes_nothing(void)
 {
-    run_limb();
+    swap_run(&limb);
     const uint32_t changes = limb.events[PDCP_EVENT_LINK];
-    limb_power_on(&limb, SPARE);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_run_ms(&limb, 3000);
-    limb_expect(&limb, LINKS);
+    limb_expect(&limb, SWAP_LINKS);
     TEST_ASSERT_EQUAL(changes, limb.events[PDCP_EVENT_LINK]);
 }
 
 /* Also one that start-up would have preferred, by its serial number. */
 static void test_a_better_part_that_comes_later_takes_nothing(void)
 {
-    const int better = limb_add(&limb, 1, CONTROLLER);
-    run_limb();
+    const int better = limb_add(&limb, 1, SWAP_CONTROLLER);
+    swap_run(&limb);
     limb_power_on(&limb, better);
     limb_run_ms(&limb, 3000);
-    limb_expect(&limb, LINKS);
+    limb_expect(&limb, SWAP_LINKS);
 }
 
 /* D-PRO-9, both ends are disabled; the hand goes to its safe value. */
 static void test_links_rest_while_a_required_input_is_lost(void)
 {
-    run_limb();
+    swap_run(&limb);
     limb_power_off(&limb, D1);
     limb_want(&limb, "");
     limb_await(&limb, 2500);
@@ -152,7 +108,7 @@ static void test_links_rest_while_a_required_input_is_lost(void)
         TEST_ASSERT_EQUAL_HEX16(0x220E, limb_ask(&limb, 0x220D, &number, 1));
         TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, limb.answer[8 + 14]);
     }
-    limb_want(&limb, LINKS);
+    limb_want(&limb, SWAP_LINKS);
     limb_power_on(&limb, D1);
     limb_await(&limb, 2500);
     limb_expect_flow(&limb);
@@ -162,7 +118,7 @@ static void test_links_rest_while_a_required_input_is_lost(void)
 static void test_a_required_input_gets_a_replacement(void)
 {
     const int sensor = limb_add(&limb, 9, "out 5000 2130, signal = sine 0 255 2000, rate_ms = 20");
-    run_limb();
+    swap_run(&limb);
     limb_power_on(&limb, sensor);
     limb_run_ms(&limb, 1000);
     limb_want(&limb, "5.1>2.2 2.3>3.1 2.5>3.2");
@@ -199,7 +155,7 @@ static void test_the_order_of_arrival_does_not_matter(void)
         limb_end(&limb);
         setUp();
         limb.seed = (uint32_t)number;
-        (void)limb_add(&limb, 3, SENSOR);
+        (void)limb_add(&limb, 3, SWAP_SENSOR);
         join(order, tried % 3 == 0 ? 0 : 37u * (unsigned)(tried % 3), text);
         TEST_ASSERT_EQUAL_STRING("5.1>2.2 2.3>3.1 2.5>3.2", text);
         tried++;
@@ -213,16 +169,16 @@ static void test_the_order_of_arrival_does_not_matter(void)
  * candidate is tried. */
 static void test_a_refused_link_leads_to_the_next_candidate(void)
 {
-    const int bad = limb_add_with(&limb, 2, CONTROLLER, "[parameter 5 2]\n");
+    const int bad = limb_add_with(&limb, 2, SWAP_CONTROLLER, "[parameter 5 2]\n");
     limb_power_on(&limb, bad); /* it would be the first choice */
-    limb_power_on(&limb, SPARE);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_power_on(&limb, D1);
     limb_power_on(&limb, D3);
-    limb_want(&limb, LINKS_SPARE);
+    limb_want(&limb, SWAP_LINKS_SPARE);
     limb_await(&limb, 3000);
     limb_expect_flow(&limb);
     limb_run_ms(&limb, 15000); /* and later tries do no harm */
-    limb_expect(&limb, LINKS_SPARE);
+    limb_expect(&limb, SWAP_LINKS_SPARE);
     for (uint8_t i = 1; i <= 2; i++) {
         TEST_ASSERT_FALSE(
             pdcp_device_source_connected(pdcp_device_source(sim_node_device(limb.parts[bad].node), i)));
@@ -231,7 +187,7 @@ static void test_a_refused_link_leads_to_the_next_candidate(void)
 
 static void test_a_refused_link_without_another_candidate_leaves_nothing(void)
 {
-    const int bad = limb_add_with(&limb, 2, CONTROLLER, "[parameter 5 1]\n[parameter 5 2]\n");
+    const int bad = limb_add_with(&limb, 2, SWAP_CONTROLLER, "[parameter 5 1]\n[parameter 5 2]\n");
     limb_power_on(&limb, bad);
     limb_power_on(&limb, D1);
     limb_power_on(&limb, D3);
@@ -246,14 +202,14 @@ static void test_a_refused_link_without_another_candidate_leaves_nothing(void)
 /* A link by 2307h is left alone, even where an input that it requires has no source. */
 static void test_a_link_of_the_host_survives(void)
 {
-    run_limb();
+    swap_run(&limb);
     TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(&limb, 5, 4, 6, 2));
     limb_run_ms(&limb, 500);
     limb_expect(&limb, "1.1>2.2 2.3>3.1 2.4>3.2");
     limb_want(&limb, "2.4>3.2");
     limb_power_off(&limb, D1);
     limb_await(&limb, 2500);
-    limb_power_on(&limb, SPARE);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_run_ms(&limb, 1000);
     limb_expect(&limb, "2.4>3.2");
     limb_want(&limb, "1.1>2.2 2.3>3.1 2.4>3.2");
@@ -282,26 +238,26 @@ static uint8_t number_of(int part)
 /* D-PRO-6: for 3 s a device that the host has reset is not lost. */
 static void test_a_reset_by_the_host_is_no_loss(void)
 {
-    run_limb();
-    limb_power_on(&limb, SPARE);
+    swap_run(&limb);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_run_ms(&limb, 1000);
     const uint8_t number = number_of(D2);
-    limb_want(&limb, LINKS);
+    limb_want(&limb, SWAP_LINKS);
     TEST_ASSERT_EQUAL_HEX16(0x230E, limb_ask(&limb, 0x230D, &number, 1));
     limb_links(&limb, limb.wanted);
     TEST_ASSERT_NULL(strstr(limb.wanted, "4."));
-    limb_want(&limb, LINKS);
+    limb_want(&limb, SWAP_LINKS);
     limb_await(&limb, 1000);
     limb_expect_flow(&limb);
 }
 
 static void test_a_device_that_stays_away_after_a_reset_is_replaced_after_3_s(void)
 {
-    run_limb();
-    limb_power_on(&limb, SPARE);
+    swap_run(&limb);
+    limb_power_on(&limb, SWAP_SPARE);
     limb_run_ms(&limb, 1000);
     const uint8_t number = number_of(D2);
-    limb_want(&limb, LINKS_SPARE);
+    limb_want(&limb, SWAP_LINKS_SPARE);
     TEST_ASSERT_EQUAL_HEX16(0x230E, limb_ask(&limb, 0x230D, &number, 1));
     limb_power_off(&limb, D2);
     limb_run_ms(&limb, 2900);
@@ -371,13 +327,13 @@ static int links_of_second(void)
  * back. */
 static void test_a_standby_takes_the_limb_over(void)
 {
-    run_limb();
+    swap_run(&limb);
     limb_run_ms(&limb, 2000); /* who hears another one in its first 1200 ms falls silent (D-BUS-12) */
     plug_second();
     run_both(3000);
     TEST_ASSERT_TRUE(pdcp_arb_is_on_standby(&second.arb));
     TEST_ASSERT_EQUAL(PROFILE_WAITING, arb_limb_state(&second.limb));
-    limb_expect(&limb, LINKS);
+    limb_expect(&limb, SWAP_LINKS);
     limb_stop_arbitrator(&limb);
     run_both(PDCP_SHUT_MS + 5000); /* outputs get no ids before (D-BUS-36) */
     TEST_ASSERT_EQUAL(PROFILE_RUNNING, arb_limb_state(&second.limb));
@@ -392,291 +348,12 @@ static void test_a_standby_takes_the_limb_over(void)
     TEST_ASSERT_EQUAL(3, links_of_second());
 }
 
-/* --- Stored configurations --- */
-
-static void test_another_configuration_is_loaded(void)
-{
-    run_limb();
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    TEST_ASSERT_EQUAL(1, limb.app.limb.active);
-    TEST_ASSERT_EQUAL_HEX16(0x2309, limb_link(&limb, 4, 1, 5, 1)); /* it feeds 2.2: both want sole access */
-    TEST_ASSERT_EQUAL_HEX8(0x08, limb.answer[8]);
-    (void)limb_act(&limb, ARB_ACTION_CLEAR, 0);
-    TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(&limb, 4, 1, 5, 1));
-    TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(&limb, 5, 4, 6, 1));
-    limb_expect(&limb, "1.1>2.1 2.4>3.1");
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 7);
-    TEST_ASSERT_EQUAL(7, limb.app.limb.active);
-    (void)limb_act(&limb, ARB_ACTION_LOAD, 1);
-    limb_expect(&limb, LINKS);
-    TEST_ASSERT_EQUAL(1, limb.app.limb.active);
-    limb_expect_flow(&limb);
-    (void)limb_act(&limb, ARB_ACTION_LOAD, 7);
-    limb_expect(&limb, "1.1>2.1 2.4>3.1");
-    (void)limb_act(&limb, ARB_ACTION_LOAD, 7); /* idempotent */
-    limb_expect(&limb, "1.1>2.1 2.4>3.1");
-    restart(D1, D3); /* both match with all their links, 1 has more (D-PRO-4) */
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 2000);
-    TEST_ASSERT_EQUAL(1, limb.app.limb.active);
-}
-
-/* D-PRO-15: the host sees what is missing. */
-static void test_a_link_without_its_source_is_listed(void)
-{
-    static const uint8_t missing[] = {2, 0, 2, 0, 4, 0, 1, 2, 0, 2, 0, 5, 0, 2, PDCP_LINK_INACTIVE};
-    run_limb();
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    for (int i = D1; i <= D3; i++) {
-        limb_power_off(&limb, i);
-        limb_blank(&limb, i);
-    }
-    restart(D2, D3);
-    limb_run_ms(&limb, 3000);
-    bool listed = false;
-    for (uint8_t number = 1; limb_ask(&limb, 0x220D, &number, 1) == 0x220E; number++) {
-        listed = listed || memcmp(missing, &limb.answer[8], sizeof missing) == 0;
-    }
-    TEST_ASSERT_TRUE(listed);
-}
-
-/* D-PRO-18: the arbitrator has power long before the parts are there. */
-static void test_the_start_up_waits_for_a_part(void)
-{
-    limb_run_ms(&limb, 3000);
-    TEST_ASSERT_EQUAL(PROFILE_WAITING, arb_limb_state(&limb.app.limb));
-    limb_want(&limb, LINKS);
-    limb_plug(&limb, D1, D3);
-    limb_await(&limb, 1000);
-    TEST_ASSERT_GREATER_OR_EQUAL(500000 - 1000u * limb.app.arb.held_ms,
-                                 limb.linked.time_us - limb.ready.time_us);
-}
-
-static void test_a_configuration_is_erased(void)
-{
-    run_limb();
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    (void)limb_act(&limb, ARB_ACTION_ERASE, 1);
-    TEST_ASSERT_EQUAL(0, limb.app.limb.active);
-    TEST_ASSERT_EQUAL(0, limb.app.limb.config.stored);
-    limb_expect(&limb, LINKS);                        /* what works goes on */
-    const uint8_t load_none[] = {ARB_ACTION_LOAD, 0}; /* D-PRO-16 */
-    TEST_ASSERT_EQUAL_HEX16(0x2409, limb_ask(&limb, 0x2407, load_none, sizeof load_none));
-    TEST_ASSERT_EQUAL_HEX8(0x02, limb.answer[8]);
-    const uint8_t load[] = {ARB_ACTION_LOAD, 1};
-    TEST_ASSERT_EQUAL_HEX16(0x2409, limb_ask(&limb, 0x2407, load, sizeof load));
-    TEST_ASSERT_EQUAL_HEX8(0x02, limb.answer[8]);
-    for (int i = D1; i <= D3; i++) {
-        limb_power_off(&limb, i);
-        limb_blank(&limb, i);
-    }
-    restart(D1, D3);
-    limb_run_ms(&limb, 3000);
-    limb_expect(&limb, "");
-}
-
-static void test_all_links_are_removed(void)
-{
-    run_limb();
-    TEST_ASSERT_EQUAL(3, limb_act(&limb, ARB_ACTION_CLEAR, 0));
-    limb_expect(&limb, "");
-    TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&limb.app.arb.bus.tables));
-    for (int i = D2; i <= D3; i++) {
-        const pdcp_device_t *device = sim_node_device(limb.parts[i].node);
-        TEST_ASSERT_FALSE(pdcp_device_source_connected(pdcp_device_source(device, 1)));
-        TEST_ASSERT_FALSE(pdcp_device_source_connected(pdcp_device_source(device, 2)));
-    }
-    TEST_ASSERT_EQUAL(0, limb_act(&limb, ARB_ACTION_CLEAR, 0));
-    limb_run_ms(&limb, 10000);
-    limb_expect(&limb, "");
-    TEST_ASSERT_EQUAL(3, limb_act(&limb, ARB_ACTION_AUTOCONFIGURE, 0));
-    limb_expect(&limb, LINKS);
-    TEST_ASSERT_EQUAL(0, limb_act(&limb, ARB_ACTION_AUTOCONFIGURE, 0));
-}
-
-/* Both controllers remember the same sensor and ask for it; they have one each in turn with the other
- * absent. */
-static void remember_both(void)
-{
-    for (int i = 0; i < 2; i++) {
-        const int controller = i == 0 ? D2 : SPARE;
-        limb_power_on(&limb, D1);
-        limb_power_on(&limb, controller);
-        limb_power_on(&limb, D3);
-        limb_want(&limb, i == 0 ? LINKS : LINKS_SPARE);
-        limb_await(&limb, 2000);
-        limb_stop_arbitrator(&limb);
-        limb_power_off(&limb, D1);
-        limb_power_off(&limb, controller);
-        limb_power_off(&limb, D3);
-        limb_blank(&limb, D3);
-        sim_nvm_init(&limb.nvm);
-        limb_start_arbitrator(&limb);
-    }
-}
-
-/* D-PRO-19: Only one of them may have it, by its serial number; there is nothing left to be enforced. */
-static void test_two_that_remember_the_same_source(void)
-{
-    remember_both();
-    limb_plug(&limb, D1, SPARE);
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 2000);
-    limb_run_ms(&limb, 5000); /* they ask again and again */
-    limb_expect(&limb, LINKS);
-    TEST_ASSERT_EQUAL(0, limb_act(&limb, ARB_ACTION_ENFORCE, 0));
-    limb_expect(&limb, LINKS);
-}
-
-/* Also when both have asked for it, and got it, before the start-up: it waits while parts come. */
-static void test_two_that_have_got_the_same_source(void)
-{
-    const int last = limb_add(&limb, 20, "in 5200 2300");
-    remember_both();
-    limb_plug(&limb, D1, D2);
-    limb_power_on(&limb, SPARE);
-    limb_run_ms(&limb, 450);
-    limb_power_on(&limb, last);
-    limb_run_ms(&limb, 450);
-    limb_power_on(&limb, D3);
-    limb_run_ms(&limb, 400);
-    TEST_ASSERT_EQUAL(PROFILE_WAITING, arb_limb_state(&limb.app.limb));
-    limb_expect(&limb, "1.1>2.2 1.1>4.2");
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 1000);
-}
-
-/* What a foreign part remembers never overrides a stored configuration, at power-on and later. */
-static void test_a_foreign_part_does_not_override_what_is_stored(void)
-{
-    remember_both();
-    limb_plug(&limb, D1, D3);
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 2000);
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    limb_power_on(&limb, SPARE);
-    limb_run_ms(&limb, 3000);
-    limb_expect(&limb, LINKS);
-    restart(D1, SPARE);
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 2000);
-    limb_run_ms(&limb, 5000);
-    limb_expect(&limb, LINKS);
-}
-
-/* Adopted, the spare part is the original. */
-static void test_stand_ins_are_adopted(void)
-{
-    run_limb();
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    limb_power_on(&limb, SPARE);
-    limb_power_off(&limb, D2);
-    limb_want(&limb, LINKS_SPARE);
-    limb_await(&limb, 2500);
-    TEST_ASSERT_EQUAL(3, limb_act(&limb, ARB_ACTION_ADOPT, 0));
-    TEST_ASSERT_EQUAL(0, limb_act(&limb, ARB_ACTION_ADOPT, 0));
-    limb_power_on(&limb, D2);
-    limb_run_ms(&limb, 3000);
-    limb_expect(&limb, LINKS_SPARE);
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    restart(D1, SPARE);
-    limb_want(&limb, LINKS_SPARE);
-    limb_await(&limb, 2500);
-}
-
-/* Not adopted, a link that is stood in for is saved as its original. */
-static void test_originals_are_saved(void)
-{
-    run_limb();
-    limb_power_on(&limb, SPARE);
-    limb_power_off(&limb, D2);
-    limb_want(&limb, LINKS_SPARE);
-    limb_await(&limb, 2500);
-    (void)limb_act(&limb, ARB_ACTION_SAVE, 0);
-    restart(D1, SPARE);
-    limb_want(&limb, LINKS);
-    limb_await(&limb, 2500);
-}
-
-static void test_a_change_is_saved_after_5_s(void)
-{
-    set_flags(AUTO | SWAP | SAVE);
-    run_limb();
-    limb_run_ms(&limb, 4000);
-    TEST_ASSERT_EQUAL(0, limb.app.limb.config.stored);
-    limb_run_ms(&limb, 1500);
-    TEST_ASSERT_EQUAL(1, limb.app.limb.config.stored);
-    TEST_ASSERT_EQUAL(1, limb.app.limb.active);
-    const uint32_t writes = limb.nvm.writes;
-    limb_run_ms(&limb, 30000);
-    TEST_ASSERT_EQUAL(writes, limb.nvm.writes);
-    TEST_ASSERT_EQUAL_HEX16(0x2308, limb_link(&limb, 5, 4, 6, 2));
-    limb_run_ms(&limb, 6000);
-    TEST_ASSERT_GREATER_THAN(writes, limb.nvm.writes);
-    restart(D1, D3);
-    limb_want(&limb, "1.1>2.2 2.3>3.1");
-    limb_await(&limb, 2500); /* 2.4 requires 2.1, and the host's word is not stored */
-}
-
-/* --- Flags --- */
-
-static void test_flags_outlast_a_restart(void)
-{
-    set_flags(SAVE);
-    limb_run_ms(&limb, 200);
-    limb_stop_arbitrator(&limb);
-    limb_start_arbitrator(&limb);
-    TEST_ASSERT_EQUAL_HEX8(SAVE, arb_limb_flags(&limb.app.limb));
-    limb_plug(&limb, D1, D3);
-    limb_run_ms(&limb, 3000);
-    limb_expect(&limb, ""); /* autoconfigure is off */
-    set_flags(AUTO | SWAP);
-    TEST_ASSERT_EQUAL(3, limb_act(&limb, ARB_ACTION_AUTOCONFIGURE, 0));
-    limb_expect(&limb, LINKS);
-}
-
-/* The command line's word is not stored. */
-static void test_the_command_line_overrides_the_flags(void)
-{
-    limb_stop_arbitrator(&limb);
-    limb.settings.no_autoconfig = true;
-    limb_start_arbitrator(&limb);
-    limb_plug(&limb, D1, D3);
-    limb_run_ms(&limb, 3000);
-    limb_expect(&limb, "");
-    limb_stop_arbitrator(&limb);
-    limb.settings.no_autoconfig = false;
-    limb_start_arbitrator(&limb);
-    limb_want(&limb, LINKS);
-    limb_await(&limb, PDCP_SHUT_MS + 2000); /* the parts lived on (D-BUS-36) */
-}
-
-/* Nothing stands in, but an original comes back. */
-static void test_hot_swap_is_off(void)
-{
-    set_flags(AUTO);
-    run_limb();
-    limb_power_on(&limb, SPARE);
-    limb_power_off(&limb, D2);
-    limb_run_ms(&limb, 5000);
-    limb_expect(&limb, "");
-    limb_want(&limb, LINKS);
-    limb_power_on(&limb, D2);
-    limb_await(&limb, 2500);
-    limb_power_off(&limb, D2);
-    limb_run_ms(&limb, 3000);
-    limb_expect(&limb, "");
-    limb_want(&limb, LINKS_SPARE); /* until the host asks for it */
-    TEST_ASSERT_EQUAL(3, limb_act(&limb, ARB_ACTION_REPLACE, 0));
-    limb_await(&limb, 100);
-}
-
 /* --- Anything, in any order --- */
 
 /* At rest, is the hand served if it can be, and nothing linked if not? */
 static bool is_as_it_should_be(const char *text)
 {
-    const bool controller = limb.parts[D2].node != NULL || limb.parts[SPARE].node != NULL;
+    const bool controller = limb.parts[D2].node != NULL || limb.parts[SWAP_SPARE].node != NULL;
     if (limb.parts[D1].node == NULL || !controller) {
         return text[0] == '\0';
     }
@@ -711,7 +388,7 @@ static void expect_lawful(const char *text)
 static void come_and_go(uint32_t parts, uint32_t random)
 {
     char text[LIMB_TEXT];
-    run_limb();
+    swap_run(&limb);
     for (int round = 0; round < 2000; round++) {
         random = random * 1664525u + 1013904223u;
         const int part = (int)((random >> 16) % parts);
@@ -817,20 +494,6 @@ int main(void)
     RUN_TEST(test_a_reset_by_the_host_is_no_loss);
     RUN_TEST(test_a_device_that_stays_away_after_a_reset_is_replaced_after_3_s);
     RUN_TEST(test_a_standby_takes_the_limb_over);
-    RUN_TEST(test_another_configuration_is_loaded);
-    RUN_TEST(test_a_link_without_its_source_is_listed);
-    RUN_TEST(test_the_start_up_waits_for_a_part);
-    RUN_TEST(test_a_configuration_is_erased);
-    RUN_TEST(test_all_links_are_removed);
-    RUN_TEST(test_two_that_remember_the_same_source);
-    RUN_TEST(test_two_that_have_got_the_same_source);
-    RUN_TEST(test_a_foreign_part_does_not_override_what_is_stored);
-    RUN_TEST(test_stand_ins_are_adopted);
-    RUN_TEST(test_originals_are_saved);
-    RUN_TEST(test_a_change_is_saved_after_5_s);
-    RUN_TEST(test_flags_outlast_a_restart);
-    RUN_TEST(test_the_command_line_overrides_the_flags);
-    RUN_TEST(test_hot_swap_is_off);
     RUN_TEST(test_parts_come_and_go);
     RUN_TEST(test_more_parts_come_and_go);
     RUN_TEST(test_32_devices_with_4_channels_each);

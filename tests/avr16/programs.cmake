@@ -4,9 +4,12 @@
 # (target/prelude.h).
 set(avr16_parts_test_acceptance 1)
 set(avr16_parts_test_arb_app 6)
-set(avr16_parts_test_arb_hostapi 35)
+set(avr16_parts_test_arb_hostapi 13)
+set(avr16_parts_test_arb_hostbulk 4)
 set(avr16_parts_test_arb_hostevents 4)
 set(avr16_parts_test_arb_hostext 27)
+set(avr16_parts_test_arb_hostlinks 6)
+set(avr16_parts_test_arb_hostpass 8)
 set(avr16_parts_test_pdcp_device_bind 2)
 set(avr16_parts_test_pdcp_device_data 3)
 set(avr16_parts_test_pdcp_exhaustive 4)

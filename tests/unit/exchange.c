@@ -267,8 +267,7 @@ const pdcp_channel_t *exchange_input_entry(const exchange_t *x)
 void exchange_start_limb(exchange_t *x)
 {
     exchange_start(x, 0xFFFFFF00u);
-    exchange_add_output(x, "FE");
-    exchange_add_input(x);
+    exchange_add_both(x);
     exchange_clear(x);
 }
 

@@ -87,6 +87,9 @@ void exchange_ask_all(exchange_t *x, const char *node_id, const exchange_pair_t 
 void exchange_add_output(exchange_t *x, const char *out_id);
 void exchange_add_input(exchange_t *x);
 
+/* Both, the output with node id FEh. */
+void exchange_add_both(exchange_t *x);
+
 /* Device 0002:0002:0007 as id 13h, with the same input. */
 void exchange_add_second_input(exchange_t *x);
 

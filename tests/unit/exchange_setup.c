@@ -136,6 +136,12 @@ void exchange_add_input(exchange_t *x)
     exchange_rx(x, "012#0A");
 }
 
+void exchange_add_both(exchange_t *x)
+{
+    exchange_add_output(x, "FE");
+    exchange_add_input(x);
+}
+
 void exchange_add_second_input(exchange_t *x)
 {
     set_up_named_input(x, "13", "0200 0200 0700", "83 01 05 01 FFFF FFFF", "83 01 06 01 FFFF FF",

@@ -30,6 +30,7 @@ static const fake_region_t regions[] = {
 };
 
 static fake_port_t fake;
+static exchange_t *started;
 static uint8_t out[OUT_MAX]; /* what the host has not looked at yet */
 static size_t taken;         /* of the message that was taken last */
 
@@ -41,6 +42,7 @@ void hostlink_start(exchange_t *x, arb_app_t *app, bool strict)
     fake.out = out;
     fake.out_max = sizeof out;
     taken = 0;
+    started = x;
     exchange_start_app(x, app, &fake.port, &settings, 0xFFFFFF00u);
 }
 
@@ -142,6 +144,21 @@ void hostlink_answer(uint16_t id, uint8_t reference, const uint8_t *payload, uin
     if (len != 0) {
         TEST_ASSERT_EQUAL_HEX8_ARRAY(payload, have, len);
     }
+}
+
+void hostlink_request(uint16_t id, const uint8_t *payload, uint16_t len)
+{
+    hostlink_ask(started, id, 1, payload, len);
+}
+
+void hostlink_reply(uint16_t id, const uint8_t *payload, uint16_t len)
+{
+    hostlink_answer(id, 1, payload, len);
+}
+
+void hostlink_error(uint16_t id, uint8_t error)
+{
+    hostlink_answer(id, 1, &error, 1);
 }
 
 size_t hostlink_waiting(void)

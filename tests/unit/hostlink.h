@@ -27,6 +27,11 @@ void hostlink_ask(exchange_t *x, uint16_t id, uint8_t reference, const uint8_t *
 void hostlink_expect(const char *text);
 void hostlink_answer(uint16_t id, uint8_t reference, const uint8_t *payload, uint16_t len);
 
+/* The same with reference 1, for the exchange that was started; the answer is an error. */
+void hostlink_request(uint16_t id, const uint8_t *payload, uint16_t len);
+void hostlink_reply(uint16_t id, const uint8_t *payload, uint16_t len);
+void hostlink_error(uint16_t id, uint8_t error);
+
 /* Takes the oldest whole message: its id, and *len bytes of payload; 0: there is none. payload is valid until
  * the next call. */
 uint16_t hostlink_take(const uint8_t **payload, uint16_t *len);
@@ -38,6 +43,11 @@ size_t hostlink_waiting(void);
 void hostlink_silence(void);
 
 /* A payload and its length. */
-#define HOSTLINK_BYTES(...) (const uint8_t[]){__VA_ARGS__}, (uint16_t)sizeof((const uint8_t[]){__VA_ARGS__})
+#define BYTES(...) (const uint8_t[]){__VA_ARGS__}, (uint16_t)sizeof((const uint8_t[]){__VA_ARGS__})
+
+/* What payloads name the devices of exchange.h by, and one that is not there. */
+#define DEV_OUT 2, 0, 2, 0, 4, 0 /* 0002:0002:0004, id 11h, output 1 */
+#define DEV_IN 2, 0, 2, 0, 6, 0  /* 0002:0002:0006, id 12h, input 1 */
+#define DEV_NONE 9, 0, 9, 0, 9, 0
 
 #endif

@@ -5,10 +5,6 @@
 #include "hostlink.h"
 #include "unity.h"
 
-#define DEV_OUT 2, 0, 2, 0, 4, 0 /* 0002:0002:0004, id 11h, output 1 */
-#define DEV_IN 2, 0, 2, 0, 6, 0  /* 0002:0002:0006, id 12h, input 1 */
-#define BYTES HOSTLINK_BYTES
-
 static exchange_t x;
 static arb_app_t app;
 
@@ -56,8 +52,7 @@ static void test_an_empty_bus(void)
 
 static void test_devices_and_channels_are_listed(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     ask(0x2201, 1, NULL, 0);
     hostlink_answer(0x2202, 1, BYTES(2, 1, 1, 0));
     ask(0x2204, 2, BYTES(2));
@@ -208,8 +203,7 @@ static void test_a_device_that_dies_meanwhile(void)
 
 static void test_a_link_is_configured_and_listed(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     ask(0x2307, 7, BYTES(DEV_OUT, 1, DEV_IN, 1));
     hostlink_silence();
     exchange_run(&x, exchange_making);
@@ -227,8 +221,7 @@ static void test_a_link_is_configured_and_listed(void)
 
 static void test_links_that_cannot_be(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     ask(0x2307, 1, BYTES(9, 0, 9, 0, 9, 0, 1, DEV_IN, 1));
     expect_error(0x2309, 1, 0x03);
     ask(0x2307, 1, BYTES(DEV_OUT, 1, 9, 0, 9, 0, 9, 0, 1));
@@ -249,8 +242,7 @@ static void test_links_that_cannot_be(void)
 /* D-API-6: 2307h waits for a running setup, and answers 0Bh after 2 s. */
 static void test_a_link_waits_for_a_running_setup(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     exchange_rx(&x, "613#01 0900 0900 0900"); /* its setup is never answered */
     (void)exchange_drain(&x);
     ask(0x2307, 1, BYTES(DEV_OUT, 1, DEV_IN, 1));

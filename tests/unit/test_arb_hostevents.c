@@ -5,9 +5,6 @@
 #include "hostlink.h"
 #include "unity.h"
 
-#define DEV_OUT 2, 0, 2, 0, 4, 0 /* 0002:0002:0004, id 11h, output 1 */
-#define DEV_IN 2, 0, 2, 0, 6, 0  /* 0002:0002:0006, id 12h, input 1 */
-#define BYTES HOSTLINK_BYTES
 #define TIME 0x00, 0xFF, 0xFF, 0xFF  /* hostlink_start's, LSB first */
 #define LATER 0x05, 0xFF, 0xFF, 0xFF /* the first bind request was held for 5 ms (D-BUS-42) */
 
@@ -35,8 +32,7 @@ static void expect_event(const uint8_t *payload, uint16_t len)
 /* D-API-5: nothing unasked to a host that never used the group. */
 static void test_nothing_is_sent_unasked(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     arb_app_on_state(&app, x.now_ms, PDCP_BUS_PASSIVE);
     exchange_pass(&x, 3000);
     (void)exchange_drain(&x);
@@ -77,8 +73,7 @@ static void make_link(void)
 /* Also which output it was, when a link is gone. */
 static void test_links_change(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     subscribe(0x04);
     make_link();
     hostlink_answer(0x2308, 7, BYTES(2)); /* the answer goes first */
@@ -163,8 +158,7 @@ static void test_the_bus_has_another_state(void)
 /* D-API-20, D-BUS-40: an audit finds a channel whose parameter is not what it should be. */
 static void test_the_audit_finds_a_difference(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     make_link();
     hostlink_answer(0x2308, 7, BYTES(2));
     hostlink_ask(&x, 0x2416, 1, BYTES(0x00, 0x01));

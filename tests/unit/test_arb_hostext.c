@@ -6,10 +6,6 @@
 #include "hostlink.h"
 #include "unity.h"
 
-#define DEV_OUT 2, 0, 2, 0, 4, 0 /* 0002:0002:0004, id 11h, output 1 */
-#define DEV_IN 2, 0, 2, 0, 6, 0  /* 0002:0002:0006, id 12h, input 1 */
-#define BYTES HOSTLINK_BYTES
-
 static exchange_t x;
 static arb_app_t app;
 
@@ -19,21 +15,6 @@ void setUp(void)
 }
 
 void tearDown(void) {}
-
-static void ask(uint16_t id, const uint8_t *payload, uint16_t len)
-{
-    hostlink_ask(&x, id, 1, payload, len);
-}
-
-static void expect(uint16_t id, const uint8_t *payload, uint16_t len)
-{
-    hostlink_answer(id, 1, payload, len);
-}
-
-static void expect_error(uint16_t id, uint8_t error)
-{
-    hostlink_answer(id, 1, &error, 1);
-}
 
 /* Until the host has an answer, every millisecond, 3 s at most; frames are thrown away. */
 static void wait_for_answer(void)
@@ -64,11 +45,11 @@ static void test_wrong_sizes(void)
 {
     static const uint16_t ids[] = {0x2401, 0x2404, 0x2407, 0x240A, 0x240D, 0x2410, 0x2413, 0x2416};
     for (unsigned i = 0; i < sizeof ids / sizeof ids[0]; i++) {
-        ask(ids[i], BYTES(0, 0, 0, 0));
-        expect_error((uint16_t)(ids[i] + 2), 0x01);
+        hostlink_request(ids[i], BYTES(0, 0, 0, 0));
+        hostlink_error((uint16_t)(ids[i] + 2), 0x01);
     }
-    ask(0x2419, BYTES(1, 0, 0, 0, 0)); /* events come from the arbitrator only */
-    expect(0x2200, NULL, 0);
+    hostlink_request(0x2419, BYTES(1, 0, 0, 0, 0)); /* events come from the arbitrator only */
+    hostlink_reply(0x2200, NULL, 0);
 }
 
 /* --- 2401h, 2404h --- */
@@ -77,7 +58,7 @@ static uint8_t flags(void)
 {
     const uint8_t *payload = NULL;
     uint16_t len = 0;
-    ask(0x2401, NULL, 0);
+    hostlink_request(0x2401, NULL, 0);
     TEST_ASSERT_EQUAL_HEX16(0x2402, hostlink_take(&payload, &len));
     TEST_ASSERT_EQUAL(11, len);
     return payload[10];
@@ -85,9 +66,9 @@ static uint8_t flags(void)
 
 static void test_arbitrator_info(void)
 {
-    ask(0x2401, NULL, 0);
-    expect(0x2402, BYTES(1, ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH, PDCP_DEVICES_MAX,
-                         PDCP_CHANNELS_MAX, PDCP_CHANNELS_MAX, 0, 0, 0, 0x02));
+    hostlink_request(0x2401, NULL, 0);
+    hostlink_reply(0x2402, BYTES(1, ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH, PDCP_DEVICES_MAX,
+                                 PDCP_CHANNELS_MAX, PDCP_CHANNELS_MAX, 0, 0, 0, 0x02));
 #ifdef PROJECT_VERSION
     char version[20];
     (void)snprintf(version, sizeof version, "%d.%d.%d", ARB_VERSION_MAJOR, ARB_VERSION_MINOR,
@@ -101,28 +82,28 @@ static void test_flags(void)
 {
     TEST_ASSERT_EQUAL_HEX8(0x02,
                            flags()); /* from the factory 03h; no autoconfiguration by the command line */
-    ask(0x2404, BYTES(0x15));
-    expect(0x2405, NULL, 0);
+    hostlink_request(0x2404, BYTES(0x15));
+    hostlink_reply(0x2405, NULL, 0);
     TEST_ASSERT_EQUAL_HEX8(0x05, flags());
-    ask(0x2416, BYTES(0x01));
-    expect(0x2417, NULL, 0);
+    hostlink_request(0x2416, BYTES(0x01));
+    hostlink_reply(0x2417, NULL, 0);
     TEST_ASSERT_EQUAL_HEX8(0x15, flags());
-    ask(0x2404, BYTES(0x02));
-    expect(0x2405, NULL, 0);
+    hostlink_request(0x2404, BYTES(0x02));
+    hostlink_reply(0x2405, NULL, 0);
     TEST_ASSERT_EQUAL_HEX8(0x12, flags());
-    ask(0x2404, BYTES(0x20));
-    expect_error(0x2406, 0x0F);
+    hostlink_request(0x2404, BYTES(0x20));
+    hostlink_error(0x2406, 0x0F);
     TEST_ASSERT_EQUAL_HEX8(0x12, flags());
 }
 
 static void test_the_strict_flag_is_in_force_at_once(void)
 {
-    ask(0x2404, BYTES(0x08));
-    expect(0x2405, NULL, 0);
+    hostlink_request(0x2404, BYTES(0x08));
+    hostlink_reply(0x2405, NULL, 0);
     hostlink_send(&x, "FE 19 01 22 07 00 00 00");
     hostlink_answer(0x2203, 7, BYTES(0x0C));
-    ask(0x2404, BYTES(0x00));
-    expect(0x2405, NULL, 0);
+    hostlink_request(0x2404, BYTES(0x00));
+    hostlink_reply(0x2405, NULL, 0);
     hostlink_send(&x, "FE 19 01 22 07 00 00 00");
     hostlink_answer(0x2202, 7, BYTES(0, 0, 0, 0));
 }
@@ -133,14 +114,14 @@ static void test_the_strict_flag_is_in_force_at_once(void)
 static void test_actions_that_cannot_be(void)
 {
     exchange_pass(&x, 600);
-    ask(0x2407, BYTES(0, 0));
-    expect_error(0x2409, 0x0F);
-    ask(0x2407, BYTES(9, 0));
-    expect_error(0x2409, 0x0F);
-    ask(0x2407, BYTES(2, 0)); /* none is active */
-    expect_error(0x2409, 0x02);
-    ask(0x2407, BYTES(3, 7));
-    expect_error(0x2409, 0x02);
+    hostlink_request(0x2407, BYTES(0, 0));
+    hostlink_error(0x2409, 0x0F);
+    hostlink_request(0x2407, BYTES(9, 0));
+    hostlink_error(0x2409, 0x0F);
+    hostlink_request(0x2407, BYTES(2, 0)); /* none is active */
+    hostlink_error(0x2409, 0x02);
+    hostlink_request(0x2407, BYTES(3, 7));
+    hostlink_error(0x2409, 0x02);
 }
 
 /* D-API-6: an action waits for a running setup, and answers 0Bh after 2 s. */
@@ -149,7 +130,7 @@ static void test_an_action_waits_for_a_running_setup(void)
     exchange_add_output(&x, "FE");
     exchange_rx(&x, "613#01 0900 0900 0900"); /* its setup is never answered */
     (void)exchange_drain(&x);
-    ask(0x2407, BYTES(5, 0));
+    hostlink_request(0x2407, BYTES(5, 0));
     for (int ms = 0; ms < 1999; ms++) {
         exchange_wait(&x, 1);
         (void)exchange_drain(&x);
@@ -161,7 +142,7 @@ static void test_an_action_waits_for_a_running_setup(void)
         TEST_ASSERT_EQUAL(0, hostlink_waiting());
     }
     exchange_wait(&x, 1);
-    expect_error(0x2409, 0x0B);
+    hostlink_error(0x2409, 0x0B);
 }
 
 /* D-API-4, 0Dh: the memory fails. */
@@ -169,23 +150,23 @@ static void test_storage_that_fails(void)
 {
     hostlink_memory_works(false);
     exchange_pass(&x, 600);
-    ask(0x2407, BYTES(1, 1));
+    hostlink_request(0x2407, BYTES(1, 1));
     wait_for_answer();
-    expect_error(0x2409, 0x0D);
-    ask(0x240D, BYTES(0, 0, 12, 0, 1, 1, 0, 2, 3, 0, 3, 0, 0, 15, 0, 0));
+    hostlink_error(0x2409, 0x0D);
+    hostlink_request(0x240D, BYTES(0, 0, 12, 0, 1, 1, 0, 2, 3, 0, 3, 0, 0, 15, 0, 0));
     wait_for_answer();
-    expect_error(0x240F, 0x0D);
+    hostlink_error(0x240F, 0x0D);
 }
 
 static void test_an_action_with_its_result(void)
 {
     exchange_pass(&x, 600);
-    ask(0x2407, BYTES(5, 0)); /* nothing is there to be removed */
+    hostlink_request(0x2407, BYTES(5, 0)); /* nothing is there to be removed */
     wait_for_answer();
-    expect(0x2408, BYTES(0, 0));
-    ask(0x2407, BYTES(6, 0));
+    hostlink_reply(0x2408, BYTES(0, 0));
+    hostlink_request(0x2407, BYTES(6, 0));
     wait_for_answer();
-    expect(0x2408, BYTES(0, 0));
+    hostlink_reply(0x2408, BYTES(0, 0));
 }
 
 /* --- 240Ah, 240Dh --- */
@@ -194,45 +175,45 @@ static void test_an_action_with_its_result(void)
 static void test_reading_configurations(void)
 {
     exchange_pass(&x, 600);
-    ask(0x240A, BYTES(0, 0, 128));
-    expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
-    ask(0x240A, BYTES(2, 0, 3));
-    expect(0x240B, BYTES(6, 0, 2, 0, 0, 15, 0));
-    ask(0x240A, BYTES(6, 0, 3));
-    expect(0x240B, BYTES(6, 0, 6, 0));
-    ask(0x240A, BYTES(7, 0, 3));
-    expect_error(0x240C, 0x0F);
-    ask(0x240A, BYTES(0, 0, 129));
-    expect_error(0x240C, 0x0F);
+    hostlink_request(0x240A, BYTES(0, 0, 128));
+    hostlink_reply(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
+    hostlink_request(0x240A, BYTES(2, 0, 3));
+    hostlink_reply(0x240B, BYTES(6, 0, 2, 0, 0, 15, 0));
+    hostlink_request(0x240A, BYTES(6, 0, 3));
+    hostlink_reply(0x240B, BYTES(6, 0, 6, 0));
+    hostlink_request(0x240A, BYTES(7, 0, 3));
+    hostlink_error(0x240C, 0x0F);
+    hostlink_request(0x240A, BYTES(0, 0, 129));
+    hostlink_error(0x240C, 0x0F);
 }
 
 static void test_writing_configurations_that_cannot_be(void)
 {
     exchange_pass(&x, 600);
-    ask(0x240D, BYTES(1, 0, 6, 0, 0)); /* not the beginning */
+    hostlink_request(0x240D, BYTES(1, 0, 6, 0, 0)); /* not the beginning */
     wait_for_answer();
-    expect_error(0x240F, 0x0F);
-    ask(0x240D, BYTES(0, 0, 6, 0)); /* no bytes */
-    expect_error(0x240F, 0x01);
-    ask(0x240D, BYTES(0, 0, 6, 0, 1, 1, 0, 15, 0, 0)); /* one is announced, none is there */
+    hostlink_error(0x240F, 0x0F);
+    hostlink_request(0x240D, BYTES(0, 0, 6, 0)); /* no bytes */
+    hostlink_error(0x240F, 0x01);
+    hostlink_request(0x240D, BYTES(0, 0, 6, 0, 1, 1, 0, 15, 0, 0)); /* one is announced, none is there */
     wait_for_answer();
-    expect_error(0x240F, 0x0F);
-    ask(0x240A, BYTES(0, 0, 128));
-    expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
+    hostlink_error(0x240F, 0x0F);
+    hostlink_request(0x240A, BYTES(0, 0, 128));
+    hostlink_reply(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
 }
 
 /* One configuration, number 3, without links, in two pieces, and back. */
 static void test_configurations_there_and_back(void)
 {
     exchange_pass(&x, 600);
-    ask(0x2416, BYTES(0x08));
-    expect(0x2417, NULL, 0);
-    ask(0x240D, BYTES(0, 0, 12, 0, 1, 1, 0, 2, 3));
+    hostlink_request(0x2416, BYTES(0x08));
+    hostlink_reply(0x2417, NULL, 0);
+    hostlink_request(0x240D, BYTES(0, 0, 12, 0, 1, 1, 0, 2, 3));
     wait_for_answer();
-    expect(0x240E, NULL, 0);
-    ask(0x240D, BYTES(5, 0, 12, 0, 0, 3, 0, 0, 15, 0, 0));
+    hostlink_reply(0x240E, NULL, 0);
+    hostlink_request(0x240D, BYTES(5, 0, 12, 0, 0, 3, 0, 0, 15, 0, 0));
     wait_for_answer();
-    expect(0x240E, NULL, 0);
+    hostlink_reply(0x240E, NULL, 0);
     const uint8_t *event = NULL; /* they are not what they were: kind 4, none active, one stored */
     uint16_t len = 0;
     TEST_ASSERT_EQUAL_HEX16(0x2419, hostlink_take(&event, &len));
@@ -240,15 +221,15 @@ static void test_configurations_there_and_back(void)
     TEST_ASSERT_EQUAL(4, event[0]);
     TEST_ASSERT_EQUAL(0, event[5]);
     TEST_ASSERT_EQUAL(1, event[6]);
-    ask(0x2416, BYTES(0));
-    expect(0x2417, NULL, 0);
-    ask(0x240A, BYTES(0, 0, 128));
-    expect(0x240B, BYTES(12, 0, 0, 0, 1, 1, 0, 2, 3, 0, 3, 0, 0, 15, 0, 0));
-    ask(0x2407, BYTES(3, 3));
+    hostlink_request(0x2416, BYTES(0));
+    hostlink_reply(0x2417, NULL, 0);
+    hostlink_request(0x240A, BYTES(0, 0, 128));
+    hostlink_reply(0x240B, BYTES(12, 0, 0, 0, 1, 1, 0, 2, 3, 0, 3, 0, 0, 15, 0, 0));
+    hostlink_request(0x2407, BYTES(3, 3));
     wait_for_answer();
-    expect(0x2408, BYTES(0, 0));
-    ask(0x240A, BYTES(0, 0, 128));
-    expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
+    hostlink_reply(0x2408, BYTES(0, 0));
+    hostlink_request(0x240A, BYTES(0, 0, 128));
+    hostlink_reply(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
 }
 
 enum { LONG = 102 };
@@ -267,9 +248,9 @@ static void write_long_string(uint8_t *string)
     memcpy(&string[LONG - 3], (const uint8_t[]){15, 0, 0}, 3);
     memcpy(&piece[4], string, LONG);
     exchange_pass(&x, 600);
-    ask(0x240D, piece, sizeof piece);
+    hostlink_request(0x240D, piece, sizeof piece);
     wait_for_answer();
-    expect(0x240E, NULL, 0);
+    hostlink_reply(0x240E, NULL, 0);
 }
 
 /* The memory is slow: 32 bytes a step. */
@@ -277,13 +258,13 @@ static void test_many_bytes_are_read_in_steps(void)
 {
     uint8_t answer[4 + LONG] = {LONG, 0, 0, 0};
     write_long_string(&answer[4]);
-    ask(0x240A, BYTES(0, 0, 128));
+    hostlink_request(0x240A, BYTES(0, 0, 128));
     for (int i = 0; i < 2; i++) {
         TEST_ASSERT_EQUAL_UINT32(x.now_ms, arb_app_step(&app, x.now_ms));
         TEST_ASSERT_EQUAL(0, hostlink_waiting());
     }
     (void)arb_app_step(&app, x.now_ms);
-    expect(0x240B, answer, sizeof answer);
+    hostlink_reply(0x240B, answer, sizeof answer);
 }
 
 /* A string that becomes another one while it is read is read anew. */
@@ -291,22 +272,22 @@ static void test_a_string_that_changes_is_read_anew(void)
 {
     uint8_t string[LONG];
     write_long_string(string);
-    ask(0x240A, BYTES(0, 0, 128));
+    hostlink_request(0x240A, BYTES(0, 0, 128));
     TEST_ASSERT_EQUAL(ARB_CONFIG_OK, arb_config_erase(&app.limb.config, 3));
     wait_for_answer();
-    expect(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
+    hostlink_reply(0x240B, BYTES(6, 0, 0, 0, 1, 0, 0, 15, 0, 0));
 }
 
 /* Save 0 with none active takes the lowest free number, which becomes active. */
 static void test_save_and_what_the_info_says(void)
 {
     exchange_pass(&x, 600);
-    ask(0x2407, BYTES(1, 0));
+    hostlink_request(0x2407, BYTES(1, 0));
     wait_for_answer();
-    expect(0x2408, BYTES(0, 0));
-    ask(0x2401, NULL, 0);
-    expect(0x2402, BYTES(1, ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH, PDCP_DEVICES_MAX,
-                         PDCP_CHANNELS_MAX, PDCP_CHANNELS_MAX, 0, 1, 1, 0x02));
+    hostlink_reply(0x2408, BYTES(0, 0));
+    hostlink_request(0x2401, NULL, 0);
+    hostlink_reply(0x2402, BYTES(1, ARB_VERSION_MAJOR, ARB_VERSION_MINOR, ARB_VERSION_PATCH, PDCP_DEVICES_MAX,
+                                 PDCP_CHANNELS_MAX, PDCP_CHANNELS_MAX, 0, 1, 1, 0x02));
 }
 
 /* --- 2410h --- */
@@ -315,13 +296,13 @@ static void test_save_and_what_the_info_says(void)
  * nothing. */
 static void test_the_active_configuration_is_written_away(void)
 {
-    ask(0x2407, BYTES(1, 0));
+    hostlink_request(0x2407, BYTES(1, 0));
     wait_for_answer();
-    expect(0x2408, BYTES(0, 0));
+    hostlink_reply(0x2408, BYTES(0, 0));
     TEST_ASSERT_TRUE(app.arb.bus.link.stored);
-    ask(0x240D, BYTES(0, 0, 6, 0, 1, 0, 0, 15, 0, 0));
+    hostlink_request(0x240D, BYTES(0, 0, 6, 0, 1, 0, 0, 15, 0, 0));
     wait_for_answer();
-    expect(0x240E, NULL, 0);
+    hostlink_reply(0x240E, NULL, 0);
     TEST_ASSERT_EQUAL(0, app.limb.active);
     TEST_ASSERT_FALSE(app.arb.bus.link.stored);
     TEST_ASSERT_FALSE(app.arb.bus.link.stored);
@@ -329,28 +310,27 @@ static void test_the_active_configuration_is_written_away(void)
 
 static void make_link(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    ask(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
+    exchange_add_both(&x);
+    hostlink_request(0x2307, BYTES(DEV_OUT, 1, DEV_IN, 1));
     exchange_run(&x, exchange_making);
-    expect(0x2308, BYTES(2));
+    hostlink_reply(0x2308, BYTES(2));
 }
 
 /* Input off, source back to unconnected, output off (pdcp-bus.md 8). */
 static void test_a_link_is_removed(void)
 {
     make_link();
-    ask(0x2410, BYTES(DEV_IN, 1));
+    hostlink_request(0x2410, BYTES(DEV_IN, 1));
     hostlink_silence();
     exchange_pairs(&x, exchange_removing);
-    expect(0x2411, NULL, 0);
+    hostlink_reply(0x2411, NULL, 0);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
-    ask(0x2410, BYTES(DEV_IN, 1)); /* again: without traffic, as with 2307h */
-    expect(0x2411, NULL, 0);
+    hostlink_request(0x2410, BYTES(DEV_IN, 1)); /* again: without traffic, as with 2307h */
+    hostlink_reply(0x2411, NULL, 0);
     exchange_silence(&x);
-    ask(0x2201, NULL, 0);
-    expect(0x2202, BYTES(2, 1, 1, 0));
+    hostlink_request(0x2201, NULL, 0);
+    hostlink_reply(0x2202, BYTES(2, 1, 1, 0));
 }
 
 /* Milliseconds with both devices alive; the application always wants to be called later, not at once. */
@@ -370,8 +350,8 @@ static void live(uint32_t ms)
 /* Auto-save is due while the plan for a new device waits for another one's setup: it comes after the plan. */
 static void test_auto_save_waits_for_the_planner(void)
 {
-    ask(0x2404, BYTES(0x04));
-    expect(0x2405, NULL, 0);
+    hostlink_request(0x2404, BYTES(0x04));
+    hostlink_reply(0x2405, NULL, 0);
     make_link();
     const uint32_t made_ms = x.now_ms;
     live(4800);
@@ -390,12 +370,12 @@ static void test_auto_save_waits_for_the_planner(void)
 static void test_links_that_cannot_be_removed(void)
 {
     make_link();
-    ask(0x2410, BYTES(9, 0, 9, 0, 9, 0, 1));
-    expect_error(0x2412, 0x03);
-    ask(0x2410, BYTES(DEV_IN, 2));
-    expect_error(0x2412, 0x04);
-    ask(0x2410, BYTES(DEV_OUT, 1));
-    expect_error(0x2412, 0x04);
+    hostlink_request(0x2410, BYTES(9, 0, 9, 0, 9, 0, 1));
+    hostlink_error(0x2412, 0x03);
+    hostlink_request(0x2410, BYTES(DEV_IN, 2));
+    hostlink_error(0x2412, 0x04);
+    hostlink_request(0x2410, BYTES(DEV_OUT, 1));
+    hostlink_error(0x2412, 0x04);
     exchange_silence(&x);
 }
 
@@ -403,9 +383,9 @@ static void test_links_that_cannot_be_removed(void)
 static void test_a_link_is_removed_from_a_silent_device(void)
 {
     make_link();
-    ask(0x2410, BYTES(DEV_IN, 1));
+    hostlink_request(0x2410, BYTES(DEV_IN, 1));
     wait_for_answer();
-    expect_error(0x2412, 0x05);
+    hostlink_error(0x2412, 0x05);
     hostlink_silence();
 }
 
@@ -414,12 +394,12 @@ static void test_the_device_goes_while_its_link_is_removed(void)
     make_link();
     exchange_pass(&x, 1450);
     (void)exchange_drain(&x);
-    ask(0x2410, BYTES(DEV_IN, 1));
+    hostlink_request(0x2410, BYTES(DEV_IN, 1));
     for (int ms = 0; ms < 60; ms++) {
         exchange_wait(&x, 1);
         (void)exchange_drain(&x);
     }
-    expect_error(0x2412, 0x05);
+    hostlink_error(0x2412, 0x05);
     hostlink_silence();
 }
 
@@ -431,7 +411,7 @@ static void test_a_link_is_removed_too_slowly(void)
     x.arb->bus.tables.devices[0].beacon_ms = 10000;
     x.arb->bus.tables.devices[1].beacon_ms = 10000;
     x.arb->bus.tables.devices[1].ack_ms = 500;
-    ask(0x2410, BYTES(DEV_IN, 1));
+    hostlink_request(0x2410, BYTES(DEV_IN, 1));
     int writes = 0;
     for (int ms = 0; ms < 3000; ms++) {
         const can_frame_t *sent;
@@ -446,7 +426,7 @@ static void test_a_link_is_removed_too_slowly(void)
         hostlink_silence();
         exchange_wait(&x, 1);
     }
-    expect_error(0x2412, 0x05);
+    hostlink_error(0x2412, 0x05);
 }
 
 /* --- 2413h --- */
@@ -455,7 +435,7 @@ static uint32_t counter(uint8_t group, uint8_t number, uint8_t count)
 {
     const uint8_t *payload = NULL;
     uint16_t len = 0;
-    ask(0x2413, &group, 1);
+    hostlink_request(0x2413, &group, 1);
     TEST_ASSERT_EQUAL_HEX16(0x2414, hostlink_take(&payload, &len));
     TEST_ASSERT_EQUAL(group, payload[0]);
     TEST_ASSERT_EQUAL(1 + 4 * count, len);
@@ -527,10 +507,10 @@ static void test_statistics_of_the_drivers(void) /* D-API-18 */
     arb_port_t counting = *app.port;
     counting.counter = driver_counter;
     app.port = &counting;
-    ask(0x2413, BYTES(3));
-    expect(0x2414, BYTES(3, 4, 3, 2, 1, 5, 0, 0, 0, 6, 0, 0, 0));
-    ask(0x2413, BYTES(4));
-    expect_error(0x2415, 0x02);
+    hostlink_request(0x2413, BYTES(3));
+    hostlink_reply(0x2414, BYTES(3, 4, 3, 2, 1, 5, 0, 0, 0, 6, 0, 0, 0));
+    hostlink_request(0x2413, BYTES(4));
+    hostlink_error(0x2415, 0x02);
 }
 
 int main(void)

@@ -122,8 +122,7 @@ static void random_messages(bool strict)
 {
     uint8_t bytes[ARB_HOST_HEADER + 64 + ARB_HOST_CRC];
     hostlink_start(&x, &app, strict);
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     for (int n = 0; n < HEADERS; n++) {
         const uint16_t id = (uint16_t)(0x2200u + 0x100u * chance(3) + chance(0x1C));
         const uint16_t len = (uint16_t)chance(65);

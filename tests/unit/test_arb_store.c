@@ -33,8 +33,7 @@ void tearDown(void) {}
 /* D-BUS-6: also after a power cycle. */
 static void test_identities_outlive_a_power_cycle(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     exchange_pass(&x, 600);
     TEST_ASSERT_FALSE(app.store.changed);
     start();

@@ -84,8 +84,7 @@ static void offer(uint16_t id, uint8_t code, uint8_t dlc)
  * others nobody. */
 static void fill_bus(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     pdcp_channel_t *input = &x.arb->bus.tables.channels[pdcp_tables_channel(&x.arb->bus.tables, 1, 1)];
     input->link = PDCP_LINK_ACTIVE;
     input->source.channel = pdcp_tables_channel(&x.arb->bus.tables, 0, 1);

@@ -377,8 +377,7 @@ static void test_a_beacon_interval_written_by_the_host_counts(void)
 /* Any frame from it counts as life, channel data as well. */
 static void test_channel_data_counts_as_life(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_connect(x.arb, pdcp_tables_channel(&x.arb->bus.tables, 0, 1),
                                                 pdcp_tables_channel(&x.arb->bus.tables, 1, 1)));
     exchange_run(&x, exchange_making);

@@ -136,8 +136,7 @@ static void test_the_first_arbitrator_stays(void)
 static void test_going_silent_ends_what_the_host_waits_for(void)
 {
     uint8_t bytes[8];
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     exchange_meet_rival(&x);
     TEST_ASSERT_EQUAL(PDCP_OK, pdcp_arb_get(x.arb, 0, 0, 8, bytes, sizeof bytes));
     exchange_tx(&x, "311#03 08 00");
@@ -183,8 +182,7 @@ static void test_all_are_suspended_and_released(void)
 /* Several devices are reset in parallel; each waits for 8B and is then lost until it binds again. */
 static void test_devices_are_reset_side_by_side(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     exchange_clear(&x);
     TEST_ASSERT_TRUE(pdcp_arb_reset(x.arb, x.now_ms, 0));
     TEST_ASSERT_TRUE(pdcp_arb_reset(x.arb, x.now_ms, 1));
@@ -246,8 +244,7 @@ static void test_an_unknown_device_with_a_kept_id_is_told_to_reset(void)
 /* D-BUS-26: a remembered link whose making was not answered is tried again after 500 ms. */
 static void test_a_link_that_was_not_answered_is_tried_again(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     exchange_update(&x, "83 01 05 01 0200 0200", "83 01 06 01 0400 01");
     for (int i = 0; i < 3; i++) {
         exchange_tx(&x, "312#04 05 01 0200 0200");
@@ -348,8 +345,7 @@ static void test_bus_off_is_left_over_the_end_of_a_standby(void)
 static void test_a_full_queue_delays_nothing_urgent(void)
 {
     can_frame_t filler = exchange_frame("5FF#00");
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
+    exchange_add_both(&x);
     while (pdcp_txq_put(&x.arb->bus.txq, &filler) == PDCP_TXQ_TAKEN) {
     }
     exchange_wait(&x, 500);

@@ -436,11 +436,10 @@ static void test_the_host_api_has_no_other_messages(void)
 /* With a link on the bus, all tables have an entry 1. */
 static void test_answers_from_the_tables_have_the_sizes_of_the_table(void)
 {
-    exchange_add_output(&x, "FE");
-    exchange_add_input(&x);
-    hostlink_ask(&x, ARB_MSG_CONFIGURE_LINK, 1, HOSTLINK_BYTES(2, 0, 2, 0, 4, 0, 1, 2, 0, 2, 0, 6, 0, 1));
+    exchange_add_both(&x);
+    hostlink_ask(&x, ARB_MSG_CONFIGURE_LINK, 1, BYTES(2, 0, 2, 0, 4, 0, 1, 2, 0, 2, 0, 6, 0, 1));
     exchange_run(&x, exchange_making);
-    hostlink_answer(ARB_MSG_CONFIGURE_LINK + 1, 1, HOSTLINK_BYTES(PDCP_LINK_ACTIVE));
+    hostlink_answer(ARB_MSG_CONFIGURE_LINK + 1, 1, BYTES(PDCP_LINK_ACTIVE));
     for (size_t i = 0; i < COUNT(messages); i++) {
         if (messages[i].id < 0x2300) {
             const uint8_t *payload;

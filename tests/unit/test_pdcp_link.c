@@ -95,10 +95,9 @@ static void fail_at(int step)
     TEST_ASSERT_EQUAL(PDCP_ERR_REFUSED, exchange_last(&x, PDCP_EVENT_LINK_REQUEST)->status);
     TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(PDCP_NO_SOURCE_INDEX, exchange_input_entry(&x)->source.index);
-    TEST_ASSERT_FALSE(exchange_input_entry(&x)->enabled);
-    TEST_ASSERT_FALSE(x.arb->bus.tables.channels[exchange_output(&x)].enabled);
     TEST_ASSERT_EQUAL(0, pdcp_tables_count_links(&x.arb->bus.tables));
     TEST_ASSERT_EQUAL(1, x.arb->bus.stats[PDCP_STAT_LINK_FAILED]);
+    exchange_make_link(&x); /* with all steps again */
 }
 
 static void test_refused_vid_and_pid_is_undone(void)
@@ -253,7 +252,6 @@ static void test_a_link_outlives_the_ids_of_its_source(void)
         }
         exchange_silence(&x);
     }
-    TEST_ASSERT_EQUAL(0, x.arb->bus.tables.owner[0x11]);
     TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
     TEST_ASSERT_EQUAL(PDCP_NONE, exchange_input_entry(&x)->source.channel);
     exchange_add_output(&x, "FD"); /* a freed id is given out last (D-BUS-36) */

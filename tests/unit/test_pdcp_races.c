@@ -33,7 +33,7 @@ static void make_link(void)
 {
     connect_to_the_last_step();
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* The input's device is reset while the output's answer is awaited: there is no link, and the output is told
@@ -53,7 +53,7 @@ static void test_the_input_vanishes_at_the_last_step(void)
     exchange_tx(&x, "312#81 12 0200 0200 0600");
     exchange_tx(&x, "312#03 01 00");
     exchange_rx(&x, "211#84 01 04 01");
-    TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
+    TEST_ASSERT_NOT_EQUAL(PDCP_LINK_ACTIVE, exchange_input_entry(&x)->link);
     exchange_tx(&x, "311#04 04 01 00");
     exchange_rx(&x, "211#84 01 04 01");
     TEST_ASSERT_EQUAL(1, exchange_count(&x, PDCP_EVENT_LINK_REQUEST));
@@ -201,7 +201,7 @@ static void test_an_update_to_an_absent_source_silences_the_input(void)
     exchange_tx(&x, "312#8F 00 01");
     exchange_rx(&x, "211#84 01 04 01");
     exchange_run(&x, exchange_silencing);
-    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, x.arb->bus.tables.channels[exchange_input(&x)].link);
+    TEST_ASSERT_EQUAL(PDCP_LINK_INACTIVE, exchange_input_entry(&x)->link);
 }
 
 /* D-BUS-19: when its source could not even be read, the device gets no answer and asks again. */
@@ -289,8 +289,7 @@ static void test_a_source_in_pieces(void)
 /* 2410h: the link is to be taken away. Whatever happens before that has its turn, it is. */
 static void expect_no_link(void)
 {
-    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, x.arb->bus.tables.channels[exchange_input(&x)].link);
-    TEST_ASSERT_EQUAL(PDCP_TODO_NONE, x.arb->bus.tables.channels[exchange_input(&x)].todo);
+    TEST_ASSERT_EQUAL(PDCP_LINK_NONE, exchange_input_entry(&x)->link);
     TEST_ASSERT_TRUE(pdcp_arb_links_settled(x.arb));
 }
 

@@ -212,7 +212,7 @@ static void test_a_link_outlives_a_failed_setup(void)
         talk_to(0x12, "03 01 00");
     }
     talk_from(0x12, "83 00 01 00");
-    TEST_ASSERT_EQUAL(PDCP_PLACE_FAILED, talk.arb->bus.tables.devices[1].state);
+    TEST_ASSERT_EQUAL(1, exchange_count(&talk, PDCP_EVENT_SETUP_FAILED));
     talk_add(0x13, 9, "o", 0xFD);
     exchange_silence(&talk);
     talk_beacon(0x11);

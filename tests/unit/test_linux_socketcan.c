@@ -15,11 +15,11 @@
 #include <unistd.h>
 
 #include "linux_can.h"
+#include "looped.h"
 #include "unity.h"
 
 #define IFACE "pdcptest0"
 #define BUS "socketcan:" IFACE
-#define LIMIT_US 5000000u
 #define FRAMES_MAX 8192u
 #define EXIT_SKIPPED 77
 
@@ -118,39 +118,6 @@ void tearDown(void)
     shell_works("ip link del " IFACE " 2>/dev/null");
 }
 
-/* Rounds for this long. Returns how many. */
-static int settle(uint64_t time_us)
-{
-    int rounds = 0;
-    uint64_t end_us = loop_refresh_now_us(loop) + time_us;
-    loop_set_deadline_us(loop, end_us);
-    while (loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-        rounds++;
-    }
-    return rounds;
-}
-
-static void run_until_received(size_t n)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
-    loop_set_deadline_us(loop, end_us);
-    while (received_n < n && loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-    TEST_ASSERT_EQUAL_UINT(n, received_n);
-}
-
-static void run_until_state(hal_can_state_t state)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
-    loop_set_deadline_us(loop, end_us);
-    while (hal_can_health(can).state != state && loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-    TEST_ASSERT_EQUAL_INT(state, hal_can_health(can).state);
-}
-
 static void peer_sends(uint32_t id, uint8_t size, const char *data)
 {
     struct can_frame frame = {.can_id = id, .can_dlc = size};
@@ -213,14 +180,14 @@ static void test_frames_pass_in_both_directions_and_own_ones_do_not_return(void)
     peer_sends(0x123, 3, "abc");
     peer_sends(0x7FF, 0, "");
     peer_sends(0, 8, "12345678");
-    run_until_received(3);
+    looped_until(loop, &received_n, 3);
     expect_frame(0, CAN_FRAME_BASE, 0x123, 3, "abc");
     expect_frame(1, CAN_FRAME_BASE, 0x7FF, 0, "");
     expect_frame(2, CAN_FRAME_BASE, 0, 8, "12345678");
     can_frame_t frame = {.id = 0x456, .dlc = 2, .data = "xy"};
     TEST_ASSERT_TRUE(hal_can_send(can, &frame));
     expect_at_peer(0x456, 2, "xy");
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_UINT(3, received_n);
 }
 
@@ -249,7 +216,7 @@ static void test_other_kinds_are_reported_as_such(void)
 {
     open_can();
     peer_sends_other_kinds();
-    run_until_received(6);
+    looped_until(loop, &received_n, 6);
     expect_other_kinds(0);
 }
 
@@ -265,8 +232,8 @@ static void test_filters_pass_what_matches_and_all_other_kinds(void)
     peer_sends(0x200, 0, "");
     peer_sends(0x500, 0, "");
     peer_sends_other_kinds();
-    run_until_received(9);
-    settle(20000);
+    looped_until(loop, &received_n, 9);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_UINT(9, received_n);
     expect_frame(0, CAN_FRAME_BASE, 0x0FF, 0, "");
     expect_frame(1, CAN_FRAME_BASE, 0x100, 0, "");
@@ -285,13 +252,13 @@ static void test_no_filters_and_too_many_filters_pass_everything(void)
     hal_can_set_filters(can, filters, 64);
     peer_sends(0x222, 0, "");
     peer_sends(0x111, 0, "");
-    run_until_received(1);
+    looped_until(loop, &received_n, 1);
     hal_can_set_filters(can, NULL, 0);
     peer_sends(0x333, 0, "");
-    run_until_received(2);
+    looped_until(loop, &received_n, 2);
     hal_can_set_filters(can, filters, 65);
     peer_sends(0x444, 0, "");
-    run_until_received(3);
+    looped_until(loop, &received_n, 3);
     TEST_ASSERT_EQUAL_HEX16(0x111, received[0].id);
     TEST_ASSERT_EQUAL_HEX16(0x333, received[1].id);
     TEST_ASSERT_EQUAL_HEX16(0x444, received[2].id);
@@ -303,7 +270,7 @@ static void peer_sends_error(uint32_t class, uint8_t controller, uint8_t tx, uin
         .can_id = CAN_ERR_FLAG | class, .can_dlc = CAN_ERR_DLC, .data = {1, controller, 1, 1, 1, 1, tx, rx}};
     size_t before = received_n;
     TEST_ASSERT_EQUAL_INT(sizeof frame, send(peer, &frame, sizeof frame, 0));
-    run_until_received(before + 1);
+    looped_until(loop, &received_n, before + 1);
     TEST_ASSERT_EQUAL_INT(CAN_FRAME_ERROR, received[before].kind);
 }
 
@@ -372,7 +339,7 @@ static void test_batches_come_complete_and_in_order(void)
         room = rooms[i];
         received_n = 0;
         peer_sends_numbered(100);
-        run_until_received(100);
+        looped_until(loop, &received_n, 100);
         expect_numbered(100);
     }
 }
@@ -380,15 +347,15 @@ static void test_batches_come_complete_and_in_order(void)
 static void test_burst_is_one_round_and_a_single_frame_one_call(void)
 {
     open_can();
-    settle(20000);
+    looped_settle(loop, 20000);
     ready_calls = 0;
     peer_sends_numbered(100);
-    run_until_received(100);
+    looped_until(loop, &received_n, 100);
     TEST_ASSERT_LESS_OR_EQUAL_INT(4, ready_calls);
-    settle(20000);
+    looped_settle(loop, 20000);
     ready_calls = 0;
     peer_sends(1, 0, "");
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_INT(1, ready_calls);
     TEST_ASSERT_EQUAL_UINT(101, received_n);
 }
@@ -405,11 +372,11 @@ static void test_caller_that_takes_a_few_at_a_time_is_called_again(void)
     can = linux_can_open(loop, BUS, take_two, NULL, error, sizeof error);
     TEST_ASSERT_NOT_NULL_MESSAGE(can, error);
     peer_sends_numbered(9);
-    run_until_received(9);
+    looped_until(loop, &received_n, 9);
     expect_numbered(9);
-    settle(20000);
+    looped_settle(loop, 20000);
     int calls = ready_calls;
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_INT(calls, ready_calls);
 }
 
@@ -417,12 +384,12 @@ static void test_overrun_of_the_socket_is_counted(void)
 {
     open_can();
     peer_sends_numbered(8000);
-    settle(50000);
+    looped_settle(loop, 50000);
     uint32_t overruns = hal_can_health(can).rx_overruns;
     TEST_ASSERT_GREATER_THAN_UINT32(0, overruns);
     TEST_ASSERT_EQUAL_UINT32(8000, received_n + overruns);
     peer_sends(1, 0, "");
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_UINT32(overruns, hal_can_health(can).rx_overruns);
 }
 
@@ -431,7 +398,7 @@ static void expect_all_sent(unsigned n)
 {
     to_send = n;
     sent_n = 0;
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
+    uint64_t end_us = loop_refresh_now_us(loop) + LOOPED_LIMIT_US;
     loop_set_deadline_us(loop, end_us);
     send_numbered();
     TEST_ASSERT_LESS_THAN_UINT(n, sent_n); /* else this test shows nothing */
@@ -475,7 +442,7 @@ static void test_send_is_refused_without_a_call_until_there_is_room(void)
     TEST_ASSERT_FALSE(hal_can_send(can, &frame));
     TEST_ASSERT_FALSE(hal_can_send(can, &frame));
     TEST_ASSERT_EQUAL_INT(0, ready_calls);
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_GREATER_THAN_INT(0, ready_calls);
 }
 
@@ -485,7 +452,7 @@ static void expect_working(void)
     close(peer);
     peer = open_peer();
     peer_sends(0x321, 2, "ok");
-    run_until_received(1);
+    looped_until(loop, &received_n, 1);
     expect_frame(0, CAN_FRAME_BASE, 0x321, 2, "ok");
     can_frame_t frame = {.id = 0x42, .dlc = 1, .data = "z"};
     TEST_ASSERT_TRUE(hal_can_send(can, &frame));
@@ -496,14 +463,14 @@ static void expect_working(void)
 static void expect_down(void)
 {
     int calls = ready_calls;
-    run_until_state(HAL_CAN_DOWN);
-    settle(30000);
+    looped_until_state(loop, can, HAL_CAN_DOWN);
+    looped_settle(loop, 30000);
     TEST_ASSERT_GREATER_THAN_INT(calls, ready_calls);
     calls = ready_calls;
     can_frame_t frame = {.id = 1};
     TEST_ASSERT_FALSE(hal_can_send(can, &frame));
     TEST_ASSERT_EQUAL_UINT(0, hal_can_receive(can, received, 1));
-    TEST_ASSERT_LESS_OR_EQUAL_INT(3, settle(100000));
+    TEST_ASSERT_LESS_OR_EQUAL_INT(3, looped_settle(loop, 100000));
     TEST_ASSERT_EQUAL_INT(calls, ready_calls);
 }
 
@@ -515,7 +482,7 @@ static void test_interface_goes_down_and_up(void)
     expect_down();
     int calls = ready_calls;
     shell("ip link set " IFACE " up");
-    run_until_state(HAL_CAN_ACTIVE);
+    looped_until_state(loop, can, HAL_CAN_ACTIVE);
     TEST_ASSERT_GREATER_THAN_INT(calls, ready_calls);
     expect_working();
 }
@@ -527,10 +494,10 @@ static void test_interface_is_deleted_and_made_again(void)
         shell("ip link del " IFACE);
         expect_down();
         shell("ip link add dev " IFACE " type vcan");
-        settle(20000);
+        looped_settle(loop, 20000);
         TEST_ASSERT_EQUAL_INT(HAL_CAN_DOWN, hal_can_health(can).state);
         shell("ip link set " IFACE " up");
-        run_until_state(HAL_CAN_ACTIVE);
+        looped_until_state(loop, can, HAL_CAN_ACTIVE);
         expect_working();
     }
 }
@@ -545,7 +512,7 @@ static void test_interface_that_changes_unseen_works_again(void)
     open_can();
     for (size_t i = 0; i < 4; i++) {
         shell(changes[i]);
-        settle(50000);
+        looped_settle(loop, 50000);
         TEST_ASSERT_EQUAL_INT(HAL_CAN_ACTIVE, hal_can_health(can).state);
         expect_working();
     }
@@ -562,7 +529,7 @@ static void test_send_that_meets_the_change_first_recovers(void)
         shell(changes[i]);
         TEST_ASSERT_FALSE(hal_can_send(can, &frame));
         TEST_ASSERT_EQUAL_INT(HAL_CAN_DOWN, hal_can_health(can).state);
-        run_until_state(HAL_CAN_ACTIVE);
+        looped_until_state(loop, can, HAL_CAN_ACTIVE);
         expect_working();
     }
 }
@@ -572,11 +539,11 @@ static void test_frames_before_the_end_are_still_read(void)
     const char *const ends[] = {"ip link set " IFACE " down", "ip link del " IFACE};
     for (size_t i = 0; i < 2; i++) {
         open_can();
-        settle(20000);
+        looped_settle(loop, 20000);
         received_n = 0;
         peer_sends_numbered(40);
         shell(ends[i]);
-        run_until_state(HAL_CAN_DOWN);
+        looped_until_state(loop, can, HAL_CAN_DOWN);
         TEST_ASSERT_EQUAL_UINT(40, received_n);
         expect_numbered(40);
         linux_can_close(can);
@@ -595,12 +562,12 @@ static void test_filters_stay_when_the_interface_returns(void)
     open_can();
     hal_can_set_filters(can, &filter, 1);
     shell("ip link del " IFACE);
-    run_until_state(HAL_CAN_DOWN);
+    looped_until_state(loop, can, HAL_CAN_DOWN);
     shell("ip link add dev " IFACE " type vcan && ip link set " IFACE " up");
-    run_until_state(HAL_CAN_ACTIVE);
+    looped_until_state(loop, can, HAL_CAN_ACTIVE);
     expect_working();
     peer_sends(0x320, 0, "");
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_UINT(1, received_n);
 }
 
@@ -610,7 +577,7 @@ static void test_interface_that_is_down_can_be_opened(void)
     open_can();
     TEST_ASSERT_EQUAL_INT(HAL_CAN_DOWN, hal_can_health(can).state);
     shell("ip link set " IFACE " up");
-    run_until_state(HAL_CAN_ACTIVE);
+    looped_until_state(loop, can, HAL_CAN_ACTIVE);
     expect_working();
 }
 
@@ -621,9 +588,9 @@ static void test_refused_frame_goes_after_the_interface_returns(void)
     to_send = 50;
     send_numbered();
     shell("ip link set " IFACE " down");
-    run_until_state(HAL_CAN_DOWN);
+    looped_until_state(loop, can, HAL_CAN_DOWN);
     shell("ip link set " IFACE " up");
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
+    uint64_t end_us = loop_refresh_now_us(loop) + LOOPED_LIMIT_US;
     loop_set_deadline_us(loop, end_us);
     while (sent_n < to_send && loop_now_us(loop) < end_us) {
         TEST_ASSERT_TRUE(loop_run_once(loop));
@@ -636,9 +603,9 @@ static void test_idle_bus_costs_no_processor_time(void)
     struct rusage before;
     struct rusage after;
     open_can();
-    settle(20000);
+    looped_settle(loop, 20000);
     getrusage(RUSAGE_SELF, &before);
-    TEST_ASSERT_LESS_OR_EQUAL_INT(2, settle(100000));
+    TEST_ASSERT_LESS_OR_EQUAL_INT(2, looped_settle(loop, 100000));
     getrusage(RUSAGE_SELF, &after);
     TEST_ASSERT_LESS_OR_EQUAL_INT(3, after.ru_nvcsw - before.ru_nvcsw);
 }

@@ -15,9 +15,9 @@
 #include <unistd.h>
 
 #include "linux_can.h"
+#include "looped.h"
 #include "unity.h"
 
-#define LIMIT_US 5000000u
 #define FRAMES_MAX 4096u
 
 /* What the server says, and what it must hear before that (NULL: the end). */
@@ -159,38 +159,6 @@ static void open_can(void)
     TEST_ASSERT_NOT_NULL_MESSAGE(can, error);
 }
 
-static int settle(uint64_t time_us)
-{
-    int rounds = 0;
-    uint64_t end_us = loop_refresh_now_us(loop) + time_us;
-    loop_set_deadline_us(loop, end_us);
-    while (loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-        rounds++;
-    }
-    return rounds;
-}
-
-static void run_until_received(size_t n)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
-    loop_set_deadline_us(loop, end_us);
-    while (received_n < n && loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-    TEST_ASSERT_EQUAL_UINT(n, received_n);
-}
-
-static void run_until_state(hal_can_state_t state)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
-    loop_set_deadline_us(loop, end_us);
-    while (hal_can_health(can).state != state && loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-    TEST_ASSERT_EQUAL_INT(state, hal_can_health(can).state);
-}
-
 static void server_sends(const char *text)
 {
     TEST_ASSERT_EQUAL_INT(strlen(text), send(server, text, strlen(text), MSG_NOSIGNAL));
@@ -211,7 +179,7 @@ static void expect_good_frame_after(const char *garbage)
     size_t before = received_n;
     server_sends(garbage);
     server_sends("< frame 0AB 1.5 C0 >");
-    run_until_received(before + 1);
+    looped_until(loop, &received_n, before + 1);
     expect_frame(before, CAN_FRAME_BASE, 0x0AB, 1, "\xC0");
 }
 
@@ -231,7 +199,7 @@ static void test_handshake_in_pieces_with_line_feeds_works(void)
                             {NULL, NULL}};
     try_open(lines);
     TEST_ASSERT_NOT_NULL_MESSAGE(can, error);
-    run_until_received(1); /* what follows the handshake in the same packet is not lost */
+    looped_until(loop, &received_n, 1); /* what follows the handshake in the same packet is not lost */
     expect_frame(0, CAN_FRAME_BASE, 0x1FF, 0, "");
 }
 
@@ -244,7 +212,7 @@ static void test_frames_of_the_server_arrive(void)
         "< frame 000 0.0 0011223344556677 >\n"
         "<frame 1ab 1 ff>"
         "< frame 12 1.0 01 02 0A >");
-    run_until_received(5);
+    looped_until(loop, &received_n, 5);
     expect_frame(0, CAN_FRAME_BASE, 0x123, 3, "\x01\x22\x33");
     expect_frame(1, CAN_FRAME_BASE, 0x7FF, 0, "");
     expect_frame(2, CAN_FRAME_BASE, 0x000, 8, "\x00\x11\x22\x33\x44\x55\x66\x77");
@@ -259,7 +227,7 @@ static void test_other_kinds_are_reported_as_such(void)
         "< frame 00000123 1.0 42 >"
         "< frame 123 1.0 000102030405060708090A0B >"
         "< error 004 23.424242 >");
-    run_until_received(3);
+    looped_until(loop, &received_n, 3);
     expect_frame(0, CAN_FRAME_EXTENDED, 0, 1, "\x42");
     expect_frame(1, CAN_FRAME_FD, 0, 8, "\x00\x01\x02\x03\x04\x05\x06\x07");
     expect_frame(2, CAN_FRAME_ERROR, 0, 0, "");
@@ -273,9 +241,9 @@ static void test_frame_in_single_bytes_arrives(void)
     for (size_t i = 0; i < strlen(text); i++) {
         TEST_ASSERT_EQUAL_UINT(0, received_n);
         TEST_ASSERT_EQUAL_INT(1, send(server, text + i, 1, 0));
-        settle(2000);
+        looped_settle(loop, 2000);
     }
-    run_until_received(1);
+    looped_until(loop, &received_n, 1);
     expect_frame(0, CAN_FRAME_BASE, 0x123, 3, "\x01\x22\x33");
 }
 
@@ -354,18 +322,18 @@ static void test_small_rooms_get_everything_without_new_bytes(void)
         snprintf(text + strlen(text), 40, "< frame 123 1.%02d %02X >", i, (unsigned)i);
     }
     room = 7;
-    settle(20000);
+    looped_settle(loop, 20000);
     uint64_t start_us = loop_now_us(loop);
     server_sends(text);
-    run_until_received(50);
+    looped_until(loop, &received_n, 50);
     TEST_ASSERT_LESS_THAN_UINT64(500000, loop_now_us(loop) - start_us); /* by no other timer */
     for (size_t i = 0; i < 50; i++) {
         const char data[1] = {(char)i};
         expect_frame(i, CAN_FRAME_BASE, 0x123, 1, data);
     }
-    settle(20000);
+    looped_settle(loop, 20000);
     int calls = ready_calls;
-    settle(50000);
+    looped_settle(loop, 50000);
     TEST_ASSERT_EQUAL_INT(calls, ready_calls);
 }
 
@@ -413,12 +381,12 @@ static void test_slow_server_delays_but_loses_nothing(void)
         TEST_ASSERT_LESS_THAN_UINT(1000000, sent);
     }
     int calls = ready_calls;
-    TEST_ASSERT_LESS_OR_EQUAL_INT(3, settle(50000));
+    TEST_ASSERT_LESS_OR_EQUAL_INT(3, looped_settle(loop, 50000));
     TEST_ASSERT_FALSE(send_numbered(sent));
     char rest[64] = "";
     unsigned heard = 0;
     unsigned goal = sent + 5000;
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
+    uint64_t end_us = loop_refresh_now_us(loop) + LOOPED_LIMIT_US;
     while (heard < goal && loop_now_us(loop) < end_us) {
         heard = read_numbered(rest, sizeof rest, heard);
         loop_set_deadline_us(loop, loop_now_us(loop) + 1000);
@@ -431,7 +399,7 @@ static void test_slow_server_delays_but_loses_nothing(void)
     TEST_ASSERT_EQUAL_STRING("", rest);
     TEST_ASSERT_GREATER_THAN_INT(calls, ready_calls);
     TEST_ASSERT_EQUAL_UINT32(0, hal_can_health(can).tx_failed);
-    TEST_ASSERT_LESS_OR_EQUAL_INT(3, settle(50000)); /* room is no news any more */
+    TEST_ASSERT_LESS_OR_EQUAL_INT(3, looped_settle(loop, 50000)); /* room is no news any more */
 }
 
 static void lose_connection(void)
@@ -439,7 +407,7 @@ static void lose_connection(void)
     int calls = ready_calls;
     close(server);
     server = -1;
-    run_until_state(HAL_CAN_DOWN);
+    looped_until_state(loop, can, HAL_CAN_DOWN);
     TEST_ASSERT_GREATER_THAN_INT(calls, ready_calls);
     can_frame_t frame = {.id = 1};
     TEST_ASSERT_FALSE(hal_can_send(can, &frame));
@@ -450,10 +418,10 @@ static void test_lost_connection_is_made_again(void)
     open_can();
     for (int i = 0; i < 2; i++) {
         server_sends("< frame 123 1."); /* the piece does not stay */
-        settle(5000);
+        looped_settle(loop, 5000);
         lose_connection();
         start_speaking(handshake);
-        run_until_state(HAL_CAN_ACTIVE);
+        looped_until_state(loop, can, HAL_CAN_ACTIVE);
         finish_speaking();
         expect_good_frame_after("0 11 >");
         send_good(0x123, 0, "");
@@ -497,7 +465,7 @@ static void test_absent_server_costs_no_processor_time(void)
     open_can();
     close(listener);
     lose_connection();
-    TEST_ASSERT_LESS_OR_EQUAL_INT(20, settle(1000000));
+    TEST_ASSERT_LESS_OR_EQUAL_INT(20, looped_settle(loop, 1000000));
     listener = -1;
 }
 
@@ -514,7 +482,7 @@ static void test_sending_on_a_lost_connection_is_refused_and_noticed(void)
         taken = hal_can_send(can, &frame);
     }
     TEST_ASSERT_FALSE(taken);
-    run_until_state(HAL_CAN_DOWN);
+    looped_until_state(loop, can, HAL_CAN_DOWN);
 }
 
 static void expect_refused(const char *expected_reason)

@@ -13,9 +13,8 @@
 #include <unistd.h>
 
 #include "linux_uart.h"
+#include "looped.h"
 #include "unity.h"
-
-#define LIMIT_US 2000000u
 
 static char folder[] = "/tmp/test_linux_uart.XXXXXX";
 static char link_path[64];
@@ -73,29 +72,9 @@ static int open_host(void)
     return host;
 }
 
-/* Rounds for this long. */
-static void settle(uint64_t time_us)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + time_us;
-    loop_set_deadline_us(loop, end_us);
-    while (loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-}
-
-static void run_until_received(size_t n)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
-    loop_set_deadline_us(loop, end_us);
-    while (received_n < n && loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-    TEST_ASSERT_EQUAL_UINT(n, received_n);
-}
-
 static void expect_from_host(const char *text)
 {
-    run_until_received(strlen(text));
+    looped_until(loop, &received_n, strlen(text));
     TEST_ASSERT_EQUAL_MEMORY(text, received, strlen(text));
     received_n = 0;
 }
@@ -151,7 +130,7 @@ static void test_bytes_pass_unchanged_in_both_directions(void)
     uart_sends(text);
     expect_at_host(host, text);
     expect_silence_at_host(host); /* nor is anything echoed */
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_UINT(0, received_n);
     close(host);
 }
@@ -165,7 +144,7 @@ static void test_all_byte_values_arrive(void)
         bytes[i] = (uint8_t)i;
     }
     TEST_ASSERT_EQUAL_INT(256, write(host, bytes, sizeof bytes));
-    run_until_received(256);
+    looped_until(loop, &received_n, 256);
     TEST_ASSERT_EQUAL_MEMORY(bytes, received, 256);
     close(host);
 }
@@ -180,7 +159,7 @@ static void test_host_may_close_and_reopen(void)
         uart_sends("answer");
         expect_at_host(host, "answer");
         close(host);
-        settle(10000);
+        looped_settle(loop, 10000);
     }
 }
 
@@ -200,7 +179,7 @@ static void test_bytes_written_without_a_host_are_discarded(void)
     int host = open_host();
     expect_silence_at_host(host);
     close(host);
-    settle(10000);
+    looped_settle(loop, 10000);
     uart_sends("to nobody again");
     host = open_host();
     expect_silence_at_host(host);
@@ -215,7 +194,7 @@ static void test_answers_that_a_host_left_unread_do_not_reach_the_next(void)
     int host = open_host();
     uart_sends("stale");
     close(host);
-    settle(10000);
+    looped_settle(loop, 10000);
     host = open_host();
     expect_silence_at_host(host);
     uart_sends("fresh");
@@ -246,12 +225,12 @@ static void test_the_answer_of_the_next_host_survives_late_news_of_the_last(void
     int host = open_host();
     host_sends(host, "first");
     expect_from_host("first");
-    settle(1000);
+    looped_settle(loop, 1000);
     TEST_ASSERT_EQUAL_INT(1, write(other[1], "x", 1));
     close(host);
     loop_set_deadline_us(loop, loop_refresh_now_us(loop) + 1000);
     TEST_ASSERT_TRUE(loop_run_once(loop));
-    settle(1000);
+    looped_settle(loop, 1000);
     expect_at_host(next_host, "answer");
     close(next_host);
     loop_remove(loop, other[0]);
@@ -280,7 +259,7 @@ static void test_more_unread_bytes_than_one_buffer_holds_do_not_reach_the_next_h
     int host = open_host();
     fill();
     close(host);
-    settle(10000);
+    looped_settle(loop, 10000);
     host = open_host();
     expect_silence_at_host(host);
     close(host);
@@ -295,7 +274,7 @@ static void test_full_host_end_takes_less_and_reports_room_later(void)
     do { /* the kernel carries bytes on, which makes room for more for a while */
         taken = fill();
         total += taken;
-        settle(20000);
+        looped_settle(loop, 20000);
     } while (taken > 0);
     TEST_ASSERT_GREATER_THAN_UINT(0, total);
     int calls = ready_calls;
@@ -306,7 +285,7 @@ static void test_full_host_end_takes_less_and_reports_room_later(void)
         read_n += n;
     }
     TEST_ASSERT_EQUAL_UINT(total, read_n);
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_GREATER_THAN_INT(calls, ready_calls);
     uart_sends("more");
     expect_at_host(host, "more");
@@ -320,7 +299,7 @@ static void test_host_that_goes_while_the_end_is_full_gives_room(void)
     fill();
     int calls = ready_calls;
     close(host);
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_GREATER_THAN_INT(calls, ready_calls);
     uart_sends("to nobody");
 }
@@ -333,12 +312,12 @@ static void test_absent_host_costs_no_processor_time(void)
     expect_from_host("x");
     uart_sends("unread");
     close(host);
-    settle(10000);
+    looped_settle(loop, 10000);
     struct rusage before;
     struct rusage after;
     getrusage(RUSAGE_SELF, &before);
     int calls = ready_calls;
-    settle(100000);
+    looped_settle(loop, 100000);
     getrusage(RUSAGE_SELF, &after);
     TEST_ASSERT_EQUAL_INT(calls, ready_calls);
     TEST_ASSERT_LESS_OR_EQUAL_INT(3, after.ru_nvcsw - before.ru_nvcsw);
@@ -355,7 +334,7 @@ static void test_settings_of_a_host_do_not_stay_for_the_next(void)
     host_sends(host, "line\n");
     expect_from_host("line\n");
     close(host);
-    settle(10000);
+    looped_settle(loop, 10000);
     host = open_host();
     TEST_ASSERT_EQUAL_INT(0, tcgetattr(host, &settings));
     TEST_ASSERT_EQUAL_HEX32(0, settings.c_lflag & (ICANON | ECHO));
@@ -476,14 +455,14 @@ static void test_link_to_the_number_of_the_new_terminal_is_stale(void)
 static void test_a_host_that_has_left_is_told_once(void)
 {
     open_uart("pty");
-    settle(10000);
+    looped_settle(loop, 10000);
     TEST_ASSERT_FALSE(linux_uart_host_left(uart));
     int host = open_host();
     host_sends(host, "x");
     expect_from_host("x");
     TEST_ASSERT_FALSE(linux_uart_host_left(uart));
     close(host);
-    settle(10000);
+    looped_settle(loop, 10000);
     TEST_ASSERT_TRUE(linux_uart_host_left(uart));
     TEST_ASSERT_FALSE(linux_uart_host_left(uart));
 }

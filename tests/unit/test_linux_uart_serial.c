@@ -15,9 +15,8 @@
 #include <unistd.h>
 
 #include "linux_uart.h"
+#include "looped.h"
 #include "unity.h"
-
-#define LIMIT_US 3000000u
 
 static char folder[] = "/tmp/test_linux_uart_serial.XXXXXX";
 static char device[64];
@@ -96,19 +95,9 @@ static void expect_refused(const char *name, const char *reason)
     TEST_ASSERT_EQUAL_STRING(expected, error);
 }
 
-/* Rounds for this long. */
-static void settle(uint64_t time_us)
-{
-    uint64_t end_us = loop_refresh_now_us(loop) + time_us;
-    loop_set_deadline_us(loop, end_us);
-    while (loop_now_us(loop) < end_us) {
-        TEST_ASSERT_TRUE(loop_run_once(loop));
-    }
-}
-
 static void expect_from_far_end(const char *text)
 {
-    uint64_t end_us = loop_refresh_now_us(loop) + LIMIT_US;
+    uint64_t end_us = loop_refresh_now_us(loop) + LOOPED_LIMIT_US;
     TEST_ASSERT_EQUAL_INT(strlen(text), write(far_end, text, strlen(text)));
     loop_set_deadline_us(loop, end_us);
     while (received_n < strlen(text) && loop_now_us(loop) < end_us) {
@@ -170,7 +159,7 @@ static void test_bytes_pass_unchanged_in_both_directions(void)
     TEST_ASSERT_EQUAL_STRING(device, linux_uart_path(uart));
     expect_from_far_end(text);
     expect_at_far_end(text);
-    settle(20000);
+    looped_settle(loop, 20000);
     TEST_ASSERT_EQUAL_UINT(0, received_n); /* nor is anything echoed */
 }
 
@@ -211,12 +200,12 @@ static void test_an_adapter_is_pulled_out_and_comes_back(void)
     TEST_ASSERT_FALSE(linux_uart_host_left(uart));
     for (int i = 0; i < 2; i++) {
         pull_out();
-        settle(20000);
+        looped_settle(loop, 20000);
         TEST_ASSERT_TRUE(linux_uart_host_left(uart));
         TEST_ASSERT_EQUAL_UINT(5, hal_uart_write(uart, (const uint8_t *)"lost!", 5));
         TEST_ASSERT_EQUAL_UINT(0, hal_uart_read(uart, received, sizeof received));
         plug_in();
-        settle(600000); /* it is looked for twice a second */
+        looped_settle(loop, 600000); /* it is looked for twice a second */
         expect_rate(128000);
         expect_from_far_end("after");
         expect_at_far_end("again");
@@ -230,7 +219,7 @@ static void test_no_more_is_taken_than_the_line_carries_soon(void)
     char name[120];
     snprintf(name, sizeof name, "%s@57600", port);
     open_uart(name);
-    settle(1000);
+    looped_settle(loop, 1000);
     TEST_ASSERT_EQUAL_UINT(115, hal_uart_write(uart, bytes, sizeof bytes));
     TEST_ASSERT_EQUAL_UINT(0, hal_uart_write(uart, bytes, sizeof bytes));
     const uint64_t from_us = loop_now_us(loop);

@@ -21,6 +21,10 @@ struct line_writer {
     pthread_t thread;
     pthread_mutex_t lock;
     pthread_cond_t changed; /* lines came, lines were written, or the end */
+    /* The thread's own. Not on its stack: cancelled, it leaves the stack without a return, and the marks that
+     * AddressSanitizer has put around variables stay there. */
+    char chunk[CHUNK];
+    struct pollfd room;
     /* Shared, under lock: */
     size_t begin; /* of what waits in bytes, a ring */
     size_t used;
@@ -42,17 +46,17 @@ static uint64_t lines_in(const char *bytes, size_t size)
     return lines;
 }
 
-/* Writes it all. False: errno says why not. */
-static bool write_all(int fd, const char *bytes, size_t size)
+/* Writes the chunk. False: errno says why not. */
+static bool write_all(line_writer_t *writer, size_t size)
 {
+    const char *bytes = writer->chunk;
     while (size != 0) {
-        const ssize_t n = write(fd, bytes, size);
+        const ssize_t n = write(writer->fd, bytes, size);
         if (n > 0) {
             bytes += n;
             size -= (size_t)n;
         } else if (n < 0 && errno == EAGAIN) { /* somebody has made the descriptor non-blocking */
-            struct pollfd room = {.fd = fd, .events = POLLOUT};
-            (void)poll(&room, 1, -1);
+            (void)poll(&writer->room, 1, -1);
         } else if (n < 0 && errno != EINTR) {
             return false;
         }
@@ -61,12 +65,12 @@ static bool write_all(int fd, const char *bytes, size_t size)
 }
 
 /* Takes a chunk out of the ring. Returns its size. */
-static size_t take(line_writer_t *writer, char chunk[CHUNK])
+static size_t take(line_writer_t *writer)
 {
     const size_t straight = LINE_WRITER_BYTES - writer->begin;
     size_t size = writer->used < CHUNK ? writer->used : CHUNK;
     size = size < straight ? size : straight;
-    memcpy(chunk, &writer->bytes[writer->begin], size);
+    memcpy(writer->chunk, &writer->bytes[writer->begin], size);
     writer->begin = (writer->begin + size) % LINE_WRITER_BYTES;
     writer->used -= size;
     return size;
@@ -87,7 +91,6 @@ static void note_failure(line_writer_t *writer, int reason, uint64_t lines)
 static void *write_lines(void *ctx)
 {
     line_writer_t *writer = ctx;
-    char chunk[CHUNK];
     (void)pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, NULL);
     (void)pthread_mutex_lock(&writer->lock);
     while (!writer->ends || writer->used != 0) {
@@ -95,15 +98,15 @@ static void *write_lines(void *ctx)
             (void)pthread_cond_wait(&writer->changed, &writer->lock);
             continue;
         }
-        const size_t size = take(writer, chunk);
+        const size_t size = take(writer);
         (void)pthread_mutex_unlock(&writer->lock);
         (void)pthread_setcancelstate(PTHREAD_CANCEL_ENABLE, NULL);
-        const bool written = write_all(writer->fd, chunk, size);
+        const bool written = write_all(writer, size);
         const int reason = errno;
         (void)pthread_setcancelstate(PTHREAD_CANCEL_DISABLE, NULL);
         (void)pthread_mutex_lock(&writer->lock);
         if (!written) {
-            note_failure(writer, reason, lines_in(chunk, size));
+            note_failure(writer, reason, lines_in(writer->chunk, size));
         }
         (void)pthread_cond_broadcast(&writer->changed);
     }
@@ -138,6 +141,7 @@ line_writer_t *line_writer_open(int fd, const char *before, const char *after)
         return NULL;
     }
     writer->fd = fd;
+    writer->room = (struct pollfd){.fd = fd, .events = POLLOUT};
     writer->before = before;
     writer->after = after;
     if (!start(writer)) {

@@ -15,7 +15,7 @@ static void on_ready(profile_run_t *run, const pdcp_arb_t *arb, uint32_t now_ms,
         }
     }
     pdcp_bit_set(run->scene.awaited, place, false);
-    if (run->state != PROFILE_RUN_WAITING && !arb->bus.link.stored) {
+    if (run->state != PROFILE_RUN_WAITING && !pdcp_arb_is_stored(arb)) {
         profile_active_read_back(run, place);
     }
     if (run->due == 0) {
@@ -162,11 +162,11 @@ static void on_link(profile_run_t *run, const pdcp_arb_t *arb, uint8_t input)
     if (dropping) {
         return;
     }
-    if (link == PDCP_LINK_NONE && arb->bus.link.job.kind == PDCP_TODO_REMOVE) {
+    if (pdcp_arb_removed_source(arb, input) != NULL) {
         on_removed(run, input, entry);
     } else if (is_broken(run, input)) {
         on_broken(run, input);
-    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_RUN_WAITING && !arb->bus.link.stored &&
+    } else if (link != PDCP_LINK_NONE && run->state != PROFILE_RUN_WAITING && !pdcp_arb_is_stored(arb) &&
                !profile_run_is_linking(run)) {
         on_asked(run, input, entry);
     }

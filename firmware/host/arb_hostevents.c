@@ -56,18 +56,18 @@ static void put_device(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t
     }
 }
 
-/* An input whose link was taken away has no source any more: the job that has done it still knows. */
+/* An input whose link was removed has no source any more: the host is told which one it had. */
 static void put_link(arb_hostevents_t *events, const pdcp_arb_t *arb, uint32_t now_ms, uint8_t number)
 {
     const pdcp_channel_t *input = &arb->bus.tables.channels[number];
-    const pdcp_job_t *job = &arb->bus.link.job;
+    const pdcp_source_t *removed = pdcp_arb_removed_source(arb, number);
     uint8_t *data = put(events, now_ms, ARB_EVENT_LINK, ARB_EVENT_DATA_MAX);
     if (data == NULL) {
         return;
     }
     arb_hostcodec_put_link(data, &arb->bus.tables, input);
-    if (input->link == PDCP_LINK_NONE && job->input == number && job->kind == PDCP_TODO_REMOVE) {
-        arb_hostcodec_put_channel(data, &job->old.identity, job->old.index);
+    if (removed != NULL) {
+        arb_hostcodec_put_channel(data, &removed->identity, removed->index);
     }
 }
 

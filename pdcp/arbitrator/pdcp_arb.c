@@ -432,6 +432,15 @@ void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored)
     arb->bus.link.stored = stored;
 }
 
+/* The job that removes a link still knows the source. */
+const pdcp_source_t *pdcp_arb_removed_source(const pdcp_arb_t *arb, uint8_t input)
+{
+    const pdcp_job_t *job = &arb->bus.link.job;
+    const bool removed = arb->bus.tables.channels[input].link == PDCP_LINK_NONE && job->input == input &&
+                         job->kind == PDCP_TODO_REMOVE;
+    return removed ? &job->old : NULL;
+}
+
 void pdcp_arb_deactivate(pdcp_arb_t *arb, uint32_t now_ms, uint8_t input)
 {
     arb->bus.now_ms = now_ms;

@@ -95,6 +95,16 @@ bool pdcp_arb_take_restart(pdcp_arb_t *arb);
  * forgotten when the arbitrator starts again. */
 void pdcp_arb_plan_links(pdcp_arb_t *arb, bool stored);
 
+/* Has pdcp_arb_plan_links said that a stored configuration is loaded? */
+static inline bool pdcp_arb_is_stored(const pdcp_arb_t *arb)
+{
+    return arb->bus.link.stored;
+}
+
+/* The source that an input has just lost. Call while PDCP_EVENT_LINK tells of this input. NULL: its link is
+ * there, or is gone for another reason than that it was removed. Valid until the event has been handled. */
+const pdcp_source_t *pdcp_arb_removed_source(const pdcp_arb_t *arb, uint8_t input);
+
 /* Begins the audit, which never ends (D-BUS-40, pdcp_audit.h). */
 void pdcp_arb_audit(pdcp_arb_t *arb, uint32_t now_ms);
 

@@ -1,4 +1,4 @@
-/* What is wrong, as one line on standard error for whoever started the program. */
+/* Reports an error as one line on standard error, safe for a terminal. */
 #ifndef COMPLAINT_H
 #define COMPLAINT_H
 

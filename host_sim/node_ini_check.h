@@ -1,4 +1,4 @@
-/* What only the whole of a device description shows. Private to node_ini*.c. */
+/* Checks of a device description that need the whole file. Private to node_ini*.c. */
 #ifndef NODE_INI_CHECK_H
 #define NODE_INI_CHECK_H
 

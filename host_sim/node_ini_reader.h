@@ -1,5 +1,6 @@
-/* What the parts of node_ini share while they read one file. Private to node_ini*.c: node_ini_load reads
- * sections, node_ini_key their keys, and node_ini_check judges what only the whole file shows. */
+/* State shared by the parts of node_ini while they read one file. Private to node_ini*.c.
+ *
+ * node_ini_load reads sections, node_ini_key their keys; node_ini_check checks what needs the whole file. */
 #ifndef NODE_INI_READER_H
 #define NODE_INI_READER_H
 

@@ -1,4 +1,4 @@
-/* What the output of a simulated device sends. docs/nodes.md has the words. */
+/* The signals that outputs of a simulated device send. docs/nodes.md lists them. */
 #ifndef NODE_SIGNAL_H
 #define NODE_SIGNAL_H
 

@@ -1,7 +1,11 @@
-/* Writable parameters of a simulated device in a text file, so that they can be read and prepared by hand:
+/* Keeps the writable parameters of a simulated device in a text file that people can read and edit:
+ *
  *   node_id 16
- *   source 1 0002 0002 0004 1 5000 2120     input; VID PID SN (hexadecimal), channel index, type, profile
- * (hexadecimal) A write replaces the file as a whole: whoever reads it sees the old or the new one. */
+ *   source 1 0002 0002 0004 1 5000 2120
+ *
+ * A source line holds the input, then VID, PID and serial number (hexadecimal), the channel index, and type
+ * and profile (hexadecimal). A write replaces the file as a whole: a reader sees the old one or the new
+ * one. */
 #ifndef NODE_STATE_H
 #define NODE_STATE_H
 

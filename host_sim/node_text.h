@@ -1,4 +1,4 @@
-/* What every part of a device description is made of: numbers and file names. */
+/* Reads the elements of a device description: numbers and file names. */
 #ifndef NODE_TEXT_H
 #define NODE_TEXT_H
 

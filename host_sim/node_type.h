@@ -1,4 +1,4 @@
-/* The type of a channel as a device description writes it. docs/nodes.md has the words. */
+/* Reads a channel type as a device description writes it. docs/nodes.md lists the words. */
 #ifndef NODE_TYPE_H
 #define NODE_TYPE_H
 

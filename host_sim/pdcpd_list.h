@@ -1,4 +1,4 @@
-/* pdcpd --list: what this machine has for --can and --host. */
+/* pdcpd --list: prints the buses and host ports of this machine. */
 #ifndef PDCPD_LIST_H
 #define PDCPD_LIST_H
 

@@ -1,7 +1,8 @@
-/* The log of pdcpd: what happens on the bus, for the person who runs it, on standard error.
+/* The log of pdcpd on standard error, for the person who runs it.
  *
- * It never blocks (line_writer.h). Of one kind of event it says PDCPD_LOG_RATE lines a second; the others are
- * counted and told when the second is over. Each line begins with the time, unless a journal adds it. */
+ * It never blocks (line_writer.h). It writes up to PDCPD_LOG_RATE lines a second of each kind of event,
+ * counts the others, and reports the count when the second is over. Each line begins with the time, unless a
+ * journal adds it. */
 #ifndef PDCPD_LOG_H
 #define PDCPD_LOG_H
 

@@ -150,8 +150,8 @@ static void on_server_changed(void *ctx)
     (void)ctx; /* the world runs after every turn of the loop */
 }
 
-/* Hands bytes of the host to the application until there are no more, or it takes no more: then the host does not
- * read its answers. True: it has taken some. */
+/* Hands bytes of the host to the application until there are no more, or it takes no more: then the host does
+ * not read its answers. True: it has taken some. */
 static bool take_host_bytes(daemon_t *daemon, uint32_t now_ms)
 {
     bool any = false;

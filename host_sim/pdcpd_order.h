@@ -1,4 +1,4 @@
-/* What a request of the host changes, in words, for the log. */
+/* Describes in words what a request of the host changes, for the log. */
 #ifndef PDCPD_ORDER_H
 #define PDCPD_ORDER_H
 

@@ -1,7 +1,7 @@
 /* A CAN bus in memory: arbitration by identifier and bit time, as a real one has them.
  *
- * Passive: time goes in, deliveries come out, and so the same bus runs on the real clock (pdcpd, pdcp-node)
- * and on a virtual one (tests, pdcp-sim). At 1 Mbit/s one bit is one microsecond: all times here are
+ * Passive: time goes in, deliveries come out. So the same bus runs on the real clock (pdcpd) and on a virtual
+ * one (tests). At 1 Mbit/s one bit is one microsecond: all times here are
  * microseconds, 64 bits wide, on the caller's clock.
  *
  * Every port is one controller. It holds a queue of frames and offers the one with the lowest identifier,
@@ -14,9 +14,9 @@
  * When a frame starts. The bus is idle when the last sim_bus_step found nothing under way and nothing
  * waiting. Frames offered to an idle bus start at the now_us of the next sim_bus_step, or at idle_from_us if
  * that is later. Frames offered while it is not idle, in a receive callback too, compete for the instant at
- * which the bus becomes free, however late sim_bus_step is called. Who offers a frame at a time of his own
- * therefore calls sim_bus_step for that time before sim_bus_send, and again after it: deliveries then do
- * not depend on how often it is called in between. */
+ * which the bus becomes free, however late sim_bus_step is called. A caller that offers a frame at a chosen
+ * time therefore calls sim_bus_step for that time both before and after sim_bus_send: then deliveries do not
+ * depend on how often it is called in between. */
 #ifndef SIM_BUS_H
 #define SIM_BUS_H
 

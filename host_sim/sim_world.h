@@ -1,7 +1,7 @@
 /* A limb in memory: one simulated bus, the devices on it, and at most one arbitrator.
  *
- * Passive, like everything it holds: sim_world_run carries the world on to a time, event by event, and says
- * when the next one is due. The same world runs on the real clock (pdcpd --can sim) and on a virtual one
+ * Passive, like everything it holds: sim_world_run advances the world to a time, event by event, and returns
+ * when the next event is due. The same world runs on the real clock (pdcpd --can sim) and on a virtual one
  * (tests). Others join the bus as further ports (sim_bus_attach). Times are microseconds; the arbitrator's
  * milliseconds are clock_ms at start_us and go on from there, so that a test can begin shortly before they
  * wrap. */

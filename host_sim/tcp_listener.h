@@ -1,4 +1,4 @@
-/* A listening TCP socket on 127.0.0.1. It does not block: the owner watches fd and accepts when it is
+/* A listening TCP socket on 127.0.0.1. It does not block: the owner watches fd and accepts when fd is
  * readable. */
 #ifndef TCP_LISTENER_H
 #define TCP_LISTENER_H

@@ -1,9 +1,9 @@
-/* The interrupt handlers. Their names are the vendor's: its linker scripts put functions so called into the
- * vector table.
+/* The interrupt handlers. The vendor's linker scripts find them by these names and put them into the vector
+ * table.
  *
- * How long each takes at most, entry and exit included, stands with it: cycles that a simulator of the EP
- * part counted, compiled with -O1, and their time at 40 MIPS. The smaller part needs fewer: its registers are
- * read in one cycle, not two. */
+ * Each comment gives the longest run time, entry and exit included: cycles counted by a simulator of the EP
+ * part with -O1, and the time at 40 MIPS. The FJ part needs fewer cycles: it reads a register in one, not
+ * two. */
 #ifndef HANDLERS_H
 #define HANDLERS_H
 

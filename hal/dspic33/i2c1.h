@@ -1,5 +1,5 @@
-/* I2C1 as the master of a bus with one kind of transfer: some bytes out to a device, then some bytes in from
- * it. The handler does it; nothing here waits but i2c1_recover. */
+/* I2C1 as the master of its bus. Every transfer writes some bytes to a device, then reads some from it. The
+ * handler does the work; only i2c1_recover waits. */
 #ifndef I2C1_H
 #define I2C1_H
 

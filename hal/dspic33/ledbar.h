@@ -1,5 +1,5 @@
-/* Bar of ten LEDs at the I2C bus: an MCP23017 at address 20h drives them, port A bit 0 to port B bit 1, low
- * is on. */
+/* Bar of ten LEDs on the I2C bus. An MCP23017 at address 20h drives them, from port A bit 0 to port B bit 1;
+ * low is on. */
 #ifndef LEDBAR_H
 #define LEDBAR_H
 

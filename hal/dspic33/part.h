@@ -1,6 +1,5 @@
-/* The part that is built for. All that differs between the parts stands in the one header that this one
- * includes; what they have in common is used by the drivers under the register names of the vendor's
- * headers. */
+/* Selects the part to build for. The header included here holds all that differs between the parts. The
+ * drivers use what the parts share under the register names of the vendor's headers. */
 #ifndef PART_H
 #define PART_H
 

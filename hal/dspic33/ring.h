@@ -1,7 +1,8 @@
-/* Places in a ring for one writer and one reader, of which either may be an interrupt handler. head counts
- * what was put in, tail what was taken out; both wrap, so that all places can be used. The capacity is a
- * power of two of at most 128. The writer fills the place before it moves head; the reader empties it before
- * it moves tail. */
+/* Positions in a ring with one writer and one reader; either may be an interrupt handler.
+ *
+ * head counts items put in, tail items taken out. Both wrap, so every place is usable. The capacity is a
+ * power of two up to 128. The writer fills a place before it moves head; the reader empties it before it
+ * moves tail. */
 #ifndef RING_H
 #define RING_H
 

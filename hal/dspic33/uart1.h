@@ -1,6 +1,6 @@
-/* UART1, 8N1, as the byte stream to the host of hal_uart.h. Rings of 128 bytes each way: 10 ms at 128000
- * baud, 22 ms at 57600. A received byte that finds its ring full is lost, so is one with a framing error and
- * what a stalled processor left in the receiver; all are counted. */
+/* UART1, 8N1, as the byte stream to the host (hal_uart.h). Each direction has a ring of 128 bytes: 10 ms at
+ * 128000 baud, 22 ms at 57600. Lost bytes are counted: those that find the ring full, those with a framing
+ * error, and those that overran the receiver while the processor was stalled. */
 #ifndef UART1_H
 #define UART1_H
 

@@ -1,8 +1,8 @@
 /* Contract: one CAN controller.
  *
- * How a controller is opened differs between targets and stands in that target's own header. What can be
- * done with an open one is the same everywhere and stands here. No function blocks, none keeps a pointer
- * that it was given. All are called from the main loop only, never from an interrupt handler. */
+ * Each target's own header says how a controller is opened; this one says what an open controller can do. No
+ * function blocks, and none keeps a pointer that it is given. Call all of them from the main loop, never from
+ * an interrupt handler. */
 #ifndef HAL_CAN_H
 #define HAL_CAN_H
 

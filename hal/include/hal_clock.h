@@ -1,5 +1,5 @@
-/* Contract: the millisecond clock. Starts anywhere, counts up, wraps from FFFFFFFFh to 0 after 49.7 days.
- * Differences of two readings are taken modulo 2^32 (pdcp_time.h). May be called from anywhere. */
+/* Contract: the millisecond clock. It starts at any value and wraps from FFFFFFFFh to 0 after 49.7 days. Take
+ * the difference of two readings modulo 2^32 (pdcp_time.h). May be called from anywhere. */
 #ifndef HAL_CLOCK_H
 #define HAL_CLOCK_H
 

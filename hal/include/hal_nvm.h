@@ -1,8 +1,8 @@
-/* Contract: non-volatile memory, byte addressed from 0, at least HAL_NVM_SIZE bytes.
+/* Contract: non-volatile memory of at least HAL_NVM_SIZE bytes, addressed from 0.
  *
- * A write may be cut by a power failure at any byte: then some prefix of it is stored and the byte at the
- * cut is undefined; bytes outside the written range keep their values. Writes reach the memory in the order
- * in which they were started. All functions are called from the main loop only. */
+ * A power failure may cut a write at any byte. Then the bytes before the cut are stored, the byte at the cut
+ * is undefined, and bytes outside the written range keep their values. Writes reach the memory in the order
+ * in which they were started. Call all functions from the main loop. */
 #ifndef HAL_NVM_H
 #define HAL_NVM_H
 

@@ -1,4 +1,4 @@
-/* Contract: what a target knows of itself. */
+/* Contract: numbers that only the target can provide, its serial number and random ones. */
 #ifndef HAL_SYS_H
 #define HAL_SYS_H
 

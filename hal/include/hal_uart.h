@@ -1,7 +1,7 @@
 /* Contract: the byte stream to the host (UART on a microcontroller, pty or serial port on Linux).
  *
- * No function blocks; all are called from the main loop only. A host that is not there, or that closes and
- * reopens its end, is no error: bytes written meanwhile are discarded. */
+ * No function blocks; call all of them from the main loop. It is no error if the host is absent, or closes
+ * and reopens its end: bytes written in the meantime are discarded. */
 #ifndef HAL_UART_H
 #define HAL_UART_H
 

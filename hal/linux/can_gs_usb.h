@@ -1,5 +1,4 @@
-/* USB CAN adapters that speak gs_usb, driven from user space: which are plugged in. Opening one is
- * linux_can_open. */
+/* Lists the USB CAN adapters that speak gs_usb and are plugged in. linux_can_open opens one. */
 #ifndef CAN_GS_USB_H
 #define CAN_GS_USB_H
 

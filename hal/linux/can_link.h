@@ -1,5 +1,5 @@
-/* What the kernel knows of a CAN interface besides its frames: whether it is there and up, the state of its
- * controller, and the news that any of this may have changed. Over rtnetlink; private to hal/linux. */
+/* The kernel's view of a CAN interface: present, up, state of the controller, and news of any change. Uses
+ * rtnetlink. Private to hal/linux. */
 #ifndef CAN_LINK_H
 #define CAN_LINK_H
 

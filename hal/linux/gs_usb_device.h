@@ -1,8 +1,7 @@
-/* Finding and opening a USB device that speaks gs_usb. Private to hal/linux.
+/* Finds and opens a USB device that speaks gs_usb. Private to hal/linux.
  *
- * A device is one by its vendor and product: these pairs are known to belong to gs_usb adapters. An unknown
- * pair is taken when the user names the device by its serial number and its interface 0 looks as an adapter's
- * does: class FFh/FFh/FFh with a bulk endpoint each way. */
+ * Known pairs of vendor and product id are gs_usb adapters. Another device is taken if the user names it by
+ * its serial number and its interface 0 has class FFh/FFh/FFh and a bulk endpoint in each direction. */
 #ifndef GS_USB_DEVICE_H
 #define GS_USB_DEVICE_H
 

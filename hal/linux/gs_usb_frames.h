@@ -1,8 +1,7 @@
-/* Frames to and from an adapter that speaks gs_usb: bulk transfers, and the tags by which it echoes a frame
- * that went to the bus. Private to hal/linux.
+/* Moves frames to and from a gs_usb adapter by bulk transfers. Private to hal/linux.
  *
- * The owner embeds gs_usb_frames_t, zeroed, and sets adapter. Transfers exist while an adapter is plugged
- * in. */
+ * A tag identifies each frame sent; the adapter echoes it once the frame has left. The owner embeds
+ * gs_usb_frames_t, zeroed, and sets adapter. Transfers exist while an adapter is plugged in. */
 #ifndef GS_USB_FRAMES_H
 #define GS_USB_FRAMES_H
 

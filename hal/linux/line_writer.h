@@ -1,8 +1,8 @@
-/* Lines of text for people and other programs. Writing them never blocks the caller (D-LIN-6).
+/* Writes lines for people and other programs, and never blocks the caller (D-LIN-6).
  *
- * A thread writes what waits in a buffer of LINE_WRITER_BYTES. A terminal that is stopped (Ctrl-S), a pipe
- * that nobody reads, or a slow disk holds up that thread alone. Lines that find no room are lost; when there
- * is room again, a line says how many. Call all functions from one thread. */
+ * A thread writes from a buffer of LINE_WRITER_BYTES. Only that thread waits for a stopped terminal (Ctrl-S),
+ * a pipe that nobody reads, or a slow disk. Lines that do not fit are lost; once there is room again, a line
+ * says how many. Call all functions from one thread. */
 #ifndef LINE_WRITER_H
 #define LINE_WRITER_H
 

@@ -1,4 +1,4 @@
-/* Opening a CAN bus on Linux. What can be done with it then stands in hal_can.h.
+/* Opens a CAN bus on Linux. hal_can.h says what an open one can do.
  *
  * BUS is one of
  *
@@ -7,9 +7,9 @@
  *   gs_usb[:SERIAL][/CHANNEL]   a USB adapter without a driver of the kernel: the first one or the one with
  *                               this serial number; its first channel is 0. Absent without libusb
  *
- * A bus that goes away later (interface down or gone, connection lost, adapter pulled out) is no reason to
- * open anew: the state becomes HAL_CAN_DOWN, nothing is received, hal_can_send answers false, and when the
- * bus is back it goes on. */
+ * If a bus goes away later (interface down or gone, connection lost, adapter unplugged), do not reopen it.
+ * Its state becomes HAL_CAN_DOWN, nothing is received, and hal_can_send returns false until the bus is
+ * back. */
 #ifndef LINUX_CAN_H
 #define LINUX_CAN_H
 

@@ -1,5 +1,5 @@
-/* What one kind of CAN bus implements; private to hal/linux. A backend's own struct begins with a struct
- * hal_can. */
+/* The functions that each kind of CAN bus implements. Private to hal/linux. A backend's own struct begins
+ * with a struct hal_can. */
 #ifndef LINUX_CAN_BACKEND_H
 #define LINUX_CAN_BACKEND_H
 

@@ -1,5 +1,5 @@
-/* Frames as Linux has them, and adapters that speak like it (gs_usb): flags in the identifier, and error
- * frames that tell what has become of the controller. */
+/* Converts frames from and to struct can_frame, which gs_usb adapters use as well. Flags stand in the
+ * identifier, and error frames report the state of the controller. */
 #ifndef LINUX_CAN_FRAME_H
 #define LINUX_CAN_FRAME_H
 

@@ -1,5 +1,5 @@
-/* Non-volatile memory in a file of HAL_NVM_SIZE bytes; hal_nvm.h has its functions. A thread writes, so that
- * a slow disk holds nobody up. A write is on the disk (fdatasync) before hal_nvm_status says idle. */
+/* Non-volatile memory in a file of HAL_NVM_SIZE bytes (hal_nvm.h). A thread writes, so a slow disk delays
+ * nobody. When hal_nvm_status reports idle, the write is on the disk (fdatasync). */
 #ifndef LINUX_NVM_H
 #define LINUX_NVM_H
 

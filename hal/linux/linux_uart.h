@@ -1,4 +1,4 @@
-/* Opening the host's byte stream on Linux. What can be done with it then stands in hal_uart.h.
+/* Opens the host's byte stream on Linux. hal_uart.h says what an open one can do.
  *
  * PORT is one of
  *
@@ -9,9 +9,9 @@
  *   serial:DEVICE[@BAUD]    a serial line, raw, 8N1, for this program alone; any rate that the driver can
  *                           make, 128000 when none is given. While its adapter is pulled out there is no host
  *
- * When the last host of a pseudo-terminal closes its end, what it has not read is thrown away and the end is
- * put back into raw mode. A host that reopens before the loop has come round may still find bytes that were
- * meant for the one before. */
+ * When the last host of a pseudo-terminal closes its end, unread bytes are discarded and the terminal returns
+ * to raw mode. A host that opens it before the loop has noticed may still read bytes meant for the previous
+ * host. */
 #ifndef LINUX_UART_H
 #define LINUX_UART_H
 

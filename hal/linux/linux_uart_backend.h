@@ -1,5 +1,5 @@
-/* What one kind of host port implements; private to hal/linux. A backend's own struct begins with a struct
- * hal_uart. */
+/* The functions that each kind of host port implements. Private to hal/linux. A backend's own struct begins
+ * with a struct hal_uart. */
 #ifndef LINUX_UART_BACKEND_H
 #define LINUX_UART_BACKEND_H
 

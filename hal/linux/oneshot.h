@@ -1,5 +1,4 @@
-/* A timer of its own for a module that must not touch the loop's one deadline. It fires once for each
- * arming. */
+/* A timer for a module that must not use the loop's only deadline. Arming it makes it fire once. */
 #ifndef ONESHOT_H
 #define ONESHOT_H
 

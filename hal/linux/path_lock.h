@@ -1,5 +1,5 @@
-/* A lock beside a path: whoever holds PATH.lock owns what stands at PATH (D-LIN-4). The kernel gives it up when its
- * holder ends, however that comes, so that what a crash has left is known to be left. Private to hal/linux. */
+/* A lock beside a path: whoever holds PATH.lock owns PATH (D-LIN-4). The kernel releases it when its holder
+ * ends, even in a crash, so a left-over path is recognised. Private to hal/linux. */
 #ifndef PATH_LOCK_H
 #define PATH_LOCK_H
 
@@ -10,7 +10,8 @@ typedef struct {
     char *path; /* of the lock */
 } path_lock_t;
 
-/* Takes the lock beside path; makes its file if need be. False: errno says why, EWOULDBLOCK: somebody holds it. */
+/* Takes the lock beside path; makes its file if need be. False: errno says why, EWOULDBLOCK: somebody holds
+ * it. */
 bool path_lock_take(path_lock_t *lock, const char *path);
 
 /* Removes the file and gives the lock up, if it is held. */

@@ -1,5 +1,5 @@
-/* What is stored of a limb, and the host's actions and flags (profile-layer.md 4 and 5). The real device role and
- * application in virtual time. */
+/* What is stored of a limb, and the host's actions and flags (profile-layer.md 4 and 5). The real device role
+ * and application in virtual time. */
 #include <string.h>
 
 #include "swap.h"

@@ -93,7 +93,8 @@ void exchange_add_both(exchange_t *x);
 /* Device 0002:0002:0007 as id 13h, with the same input. */
 void exchange_add_second_input(exchange_t *x);
 
-/* Binds and sets up the device of that input, which answers 5, 6 and 8 with these, "83 00 05 01"; no beacon. */
+/* Binds and sets up the device of that input, which answers 5, 6 and 8 with these, "83 00 05 01"; no
+ * beacon. */
 void exchange_set_up_input(exchange_t *x, const char *vid_pid, const char *serial, const char *type);
 
 /* Starts with both devices, the output with node id FEh, shortly before the time runs over. */
@@ -107,8 +108,8 @@ extern const exchange_pair_t exchange_making[];
 extern const exchange_pair_t exchange_silencing[];
 extern const exchange_pair_t exchange_removing[];
 
-/* That input asks for the link to the source that it names: Update Data Channel, and what it answers when it is
- * asked for 5 and 6, "83 01 05 01 0200 0200". */
+/* That input asks for the link to the source that it names: Update Data Channel, and what it answers when it
+ * is asked for 5 and 6, "83 01 05 01 0200 0200". */
 void exchange_update(exchange_t *x, const char *vid_pid, const char *serial);
 
 /* The device of that output, or that input, is lost; the other one beacons. */

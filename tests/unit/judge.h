@@ -1,5 +1,5 @@
-/* A naive judge of plans for random limbs (random_limb.h). It shares nothing with the planner but the tables, and
- * fails with the limb's seed. */
+/* A naive judge of plans for random limbs (random_limb.h). It shares nothing with the planner but the tables,
+ * and fails with the limb's seed. */
 #ifndef JUDGE_H
 #define JUDGE_H
 

@@ -1,5 +1,5 @@
-/* Random limbs for the planner, on tables (systems.h): parts that match often, needs with loops, configurations
- * with missing ends. The same seed gives the same limb. */
+/* Random limbs for the planner, on tables (systems.h): parts that match often, needs with loops,
+ * configurations with missing ends. The same seed gives the same limb. */
 #ifndef RANDOM_LIMB_H
 #define RANDOM_LIMB_H
 

@@ -1,5 +1,5 @@
-/* A simulated bus with the socketcand server, which clients join over real loopback sockets. The bus runs on a
- * clock of the test. A client is the descriptor of its socket; the test closes it. */
+/* A simulated bus with the socketcand server, which clients join over real loopback sockets. The bus runs on
+ * a clock of the test. A client is the descriptor of its socket; the test closes it. */
 #ifndef SERVED_H
 #define SERVED_H
 

@@ -1,4 +1,5 @@
-/* Configurations in a memory that can lose its power (sim_nvm.h). Saved links are alike but for their type. */
+/* Configurations in a memory that can lose its power (sim_nvm.h). Saved links are alike but for their
+ * type. */
 #ifndef STORED_H
 #define STORED_H
 

@@ -1,5 +1,6 @@
 /* The 31 messages of the source on the wire [API 3.3], and what is said of parameters and resets (D-API-4).
- * Passthrough, links and long values are in test_arb_hostpass.c, test_arb_hostlinks.c and test_arb_hostbulk.c.
+ * Passthrough, links and long values are in test_arb_hostpass.c, test_arb_hostlinks.c and
+ * test_arb_hostbulk.c.
  *
  * The messages of the tables were laid out by hand from [API 3.3.1] to [API 3.3.31]; their checksums were
  * computed apart from this project's code. */

@@ -1,5 +1,5 @@
-/* Long values for the host, which pass by bulk transfer, and devices that are slow or vanish meanwhile (D-API-3,
- * D-API-16, D-BUS-13). */
+/* Long values for the host, which pass by bulk transfer, and devices that are slow or vanish meanwhile
+ * (D-API-3, D-API-16, D-BUS-13). */
 #include <string.h>
 
 #include "hostlink.h"

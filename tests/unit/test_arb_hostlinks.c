@@ -1,4 +1,5 @@
-/* Links by the host (2307h to 2309h): which it may make, and which error it is told (D-API-4, D-API-6, D-API-13). */
+/* Links by the host (2307h to 2309h): which it may make, and which error it is told (D-API-4, D-API-6,
+ * D-API-13). */
 #include "hostlink.h"
 #include "unity.h"
 

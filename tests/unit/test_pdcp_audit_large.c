@@ -1,5 +1,5 @@
-/* The audit of a large limb: 32 devices with two outputs and two inputs each, 64 links (D-BUS-40). What it asks
- * for, when, and how much of the bus that takes. */
+/* The audit of a large limb: 32 devices with two outputs and two inputs each, 64 links (D-BUS-40). What it
+ * asks for, when, and how much of the bus that takes. */
 #include <string.h>
 
 #include "exchange.h"

@@ -1,4 +1,5 @@
-/* What is asked of the planner, sole access enforced, and how the planner's work grows (profile-layer.md 4). */
+/* What is asked of the planner, sole access enforced, and how the planner's work grows (profile-layer.md
+ * 4). */
 #include <stdio.h>
 #include <string.h>
 

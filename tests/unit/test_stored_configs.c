@@ -1,5 +1,5 @@
-/* Bit rot, capacity, wear, and a long random life with power cuts, of stored configurations (profile-layer.md 5).
- * Whole contents are compared. */
+/* Bit rot, capacity, wear, and a long random life with power cuts, of stored configurations (profile-layer.md
+ * 5). Whole contents are compared. */
 #include <stdio.h>
 #include <string.h>
 

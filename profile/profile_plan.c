@@ -128,7 +128,7 @@ static profile_phase_t next_part(profile_board_t *board)
     return (profile_phase_t)parts[part].phase;
 }
 
-/* --- The end of a plan --- */
+/* --- The plan is made; profile_carry.c carries it out and ends it --- */
 
 /* The plan is made: writes down in the configuration what it has decided. Nothing is sent here;
  * profile_carry.c carries the plan out. */

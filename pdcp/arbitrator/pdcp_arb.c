@@ -37,7 +37,8 @@ static bool is_young(const pdcp_arb_t *arb)
     return pdcp_bus_age_ms(&arb->bus) < PDCP_YOUNG_MS;
 }
 
-/* A frame from an unknown id, or of an unknown device (D-BUS-15). True: there is something to be sent. */
+/* A frame from an id that no device has, or from an output of a lost or silenced one (D-BUS-15, D-BUS-37). The
+ * beacon of a lost device leads to pdcp_life_on_first_beacon instead. True: there is something to be sent. */
 static bool on_unknown(pdcp_arb_t *arb, const can_frame_t *frame)
 {
     const uint8_t id = pdcp_id_node(frame->id);
